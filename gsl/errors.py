@@ -92,4 +92,4 @@ class TrajectoryError(InputError):
         places = (("column", column), ("row", row), ("line", line))
         where = "".join(f", {name} {place}" for name, place in places if place not in (None, ""))
         super().__init__(f"{path}{where}: {problem}")
-        self.path, self.problem, self.column, self.row = Path(path), problem, column, row
+        self.path, self.problem, self.column, self.row, self.line = Path(path), problem, column, row, line

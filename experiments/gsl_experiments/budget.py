@@ -204,12 +204,18 @@ class Budget:
         without = mean_interval(none)
         rows.append((NONE, "0", *_cells(without), "", *_cells(plain, fine=True), ""))
         titles = (
-            *("grounding", "real trajectories collected", f"in real [{unit}]", "95 % interval", f"minus {NONE}"),
+            *(
+                "grounding",
+                "real trajectories collected",
+                f"on the real side [{unit}]",
+                "95 % interval",
+                f"minus {NONE}",
+            ),
             *("joints after 0.2 s, off π0 [°]", "95 % interval", f"minus those of {fewest}"),
         )
         below = f"{MEASURED}\n\n{sizes_of(self.preset_name)} {trials_of(self.first, self.trials)}. {made}\n"
         (folder / TABLE).write_text(f"{table(titles, rows)}\n{PAIRED}\n\n{below}", encoding="utf-8")
-        panels = {f"in real [{unit}]": values, "joints after 0.2 s [°]": errors}
+        panels = {f"on the real side [{unit}]": values, "joints after 0.2 s [°]": errors}
         bases = dict(zip(panels, (without.mean, plain.mean), strict=True))
         title = "What a grounding makes of more real data, with 95 % intervals"
         picture = save(budget_curve_figure(panels, bases, title), folder / FIGURE)

@@ -21,7 +21,7 @@ STUDIES = {
     "table4": "Uneven ground, two grounding steps, beside the paper's table 4.",
     "linear-walk": "A linear policy learns to walk, beside the paper's section 6.3.",
     "fig5": "The arms' mean distance to their goal, as in the paper's figure 5.",
-    "fig6": "A constant command in real, in simulation and grounded, as in the paper's figure 6.",
+    "fig6": "A constant command on the real side, in simulation and grounded, as in the paper's figure 6.",
     "fig7": "An ankle of the linear walk, as in the paper's figure 7.",
     "fig11": "Cliff Walking against the noise of the real world, as in the paper's figure 11.",
     "fig12": "A heavy pendulum with noisy actions, as in the paper's figure 12 (gsl[mujoco,rl]).",

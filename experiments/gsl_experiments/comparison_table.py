@@ -26,7 +26,7 @@ def markdown(results: Sequence[Summary], trials: Sequence[Trial], unit: Unit) ->
     as_shares = all(trial.plausible_improvement is not None for trial in trials)
     figure, name = ("plausible_improvement", "improvement") if as_shares else ("value", "value")
     own = SHARE if as_shares else unit
-    shown = in_unit(f"{name} in real", own.name)
+    shown = in_unit(f"{name} on the real side", own.name)
 
     single, paired = [], []
     for summary in results:
@@ -82,10 +82,10 @@ def _columns(results: Sequence[Summary], unit: Unit) -> Mapping[str, Sequence[st
     tellers: dict[str, Callable[[Summary], object]] = {
         **{title: attrgetter(name) for title, name in places(results).items()},
         "grounding": lambda row: row.method,
-        f"{in_unit('in real', unit.name)} (95 %)": lambda row: (
+        f"{in_unit('on the real side', unit.name)} (95 %)": lambda row: (
             f"{unit.bare(row.value.mean)} ({unit.interval([row.value.lower, row.value.upper])})"
         ),
-        "improvement in real [%] (95 %)": lambda row: (
+        "improvement on the real side [%] (95 %)": lambda row: (
             "" if row.improvement is None else f"{row.improvement.mean:.1f} ({bounds(row.improvement)})"
         ),
         "trials without a gain": lambda row: f"{row.without} of {row.trials}",

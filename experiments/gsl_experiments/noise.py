@@ -142,13 +142,15 @@ class NoiseStudy:
             ticks, along = [f"{number}" for number in self._rounds], "rounds"
         else:
             ticks = [f"{noise:g}" for noise in self.noises] if any(self.noises) else ["no noise"]
-            along = "sd of action noise in real [half ranges]" if any(self.noises) else ""
+            along = "sd of action noise on the real side [half ranges]" if any(self.noises) else ""
         panels = {}
         for world in self.worlds:
             where = [Place(*cell) for cell in product([world], self.noises, self._rounds if by_round else [last])]
             panels[f"{of}{world.replace('_', ' ')}"] = Bars(ticks, table.means(where))
         hatched = "without real data" if self.choice == SIM else "no model of real"
-        title = f"Return in real, mean ± standard error ({trials_of(self.first, self.trials)}); hatched: {hatched}"
+        title = (
+            f"Return on the real side, mean ± standard error ({trials_of(self.first, self.trials)}); hatched: {hatched}"
+        )
         return save(noise_bars_figure(panels, REFERENCE, title=title, along=along, alike=alike), path)
 
     @property

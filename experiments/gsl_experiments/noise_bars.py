@@ -58,7 +58,7 @@ def noise_bars_figure(
                 axes.fill_between(ends, mean - error, mean + error, color=REAL, alpha=0.15, linewidth=0)
                 axes.hlines(mean, *ends, color=REAL, linestyle="--", linewidth=1.4, label=label)
             axes.set_xticks(places, bars.ticks)
-            axes.set_ylabel("" if alike and axes is not grid[0, 0] else "return in real")
+            axes.set_ylabel("" if alike and axes is not grid[0, 0] else "return on the real side")
             axes.set_title(name, loc="left", fontsize=10.5)
         whole.legend(*axes.get_legend_handles_labels(), loc="outside right upper", frameon=False, fontsize=9)
         if along:

@@ -49,6 +49,6 @@ def noise_curve_figure(curves: Mapping[str, Curve], exact: Mapping[str, Sequence
         for place, height, name, colour in ends:
             axes.annotate(name, (noises[place], height), (-26, -14), textcoords="offset points", color=colour)
         axes.set_xlabel("chance that the real world replaces an action")
-        axes.set_ylabel("return in real, 95 % interval shaded")
+        axes.set_ylabel("return on the real side, 95 % interval shaded")
         headline(whole, title)
     return whole

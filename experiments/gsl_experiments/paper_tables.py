@@ -43,7 +43,7 @@ class Table3:
         results = summaries(trials)
         where = places(results, shown=["iteration"])
         titles = (
-            *(*where, "grounding", "iteration", f"in real [{task.unit}]", "95 % interval", "improvement [%]"),
+            *(*where, "grounding", "iteration", f"on the real side [{task.unit}]", "95 % interval", "improvement [%]"),
             *("95 % interval", "best generation", "falls", "refused", "stopped by then"),
             *(f"where they stop [{task.unit}]", "real episodes", f"paper [{task.unit}]", "paper: improvement [%]"),
         )
@@ -69,7 +69,7 @@ class Table3:
                 )
             )
         start = mean_interval([trial.start for trial in trials if trial.iteration == 1])
-        below = f"π0 in real: {task.shown * start.mean:.1f} {task.unit} (paper: 19.5)."
+        below = f"π0 on the real side: {task.shown * start.mean:.1f} {task.unit} (paper: 19.5)."
         return "\n".join([table(titles, rows), below, "", every_trial(trials)])
 
     def select(self, trials: Sequence[Trial], task: Task) -> Drawn:
@@ -88,7 +88,7 @@ class Table4:
         results = summaries(trials)
         where = places(results, shown=["iteration"])
         titles = (
-            *(*where, "grounding", "step", f"in real, a fall worth 0 [{task.unit}]", "95 % interval"),
+            *(*where, "grounding", "step", f"on the real side, a fall worth 0 [{task.unit}]", "95 % interval"),
             *("speed [cm/s]", "falls", "95 % interval [%]", "real episodes", "paper: speed [cm/s]", "paper: falls"),
         )
         rows = []
@@ -104,14 +104,15 @@ class Table4:
             )
         start = mean_interval([trial.start for trial in trials if trial.iteration == 1])
         below = [
-            f"π0 in real, a fall worth 0: {task.shown * start.mean:.1f} {task.unit} (paper: 14.7, always falls).",
+            f"π0 on the real side, a fall worth 0: {task.shown * start.mean:.1f} {task.unit} "
+            "(paper: 14.7, always falls).",
             "Speed is distance over the planned time, falls and all; intervals are over trials.\n",
         ]
         return "\n".join([table(titles, rows), *below, *_differences(trials, task, self.against, falls=True)])
 
     def select(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return what a trial is worth: of a π0 that falls half of the time shares would be of little."""
-        return Drawn(f"in real, a fall worth 0 [{task.unit}]", [task.shown * trial.value for trial in trials])
+        return Drawn(f"on the real side, a fall worth 0 [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
 @component
@@ -123,7 +124,7 @@ class LinearWalkTable:
         results = summaries(trials)
         where = places(results, shown=["iteration"])
         titles = (
-            *(*where, "grounding", "iteration", f"distance in real [{task.unit}]", "95 % interval"),
+            *(*where, "grounding", "iteration", f"distance on the real side [{task.unit}]", "95 % interval"),
             *("trials without a gain", "without an improving winner", "best generation", "falls", "real episodes"),
             *("paper [cm]", "paper: without an improving winner", "paper: best generation"),
         )
@@ -138,7 +139,7 @@ class LinearWalkTable:
 
     def select(self, trials: Sequence[Trial], task: Task) -> Drawn:
         """Return the distances."""
-        return Drawn(f"distance in real [{task.unit}]", [task.shown * trial.value for trial in trials])
+        return Drawn(f"distance on the real side [{task.unit}]", [task.shown * trial.value for trial in trials])
 
 
 @component
@@ -169,7 +170,7 @@ class Figure5:
         titles = (
             *(*where, "grounding", "mean distance [°]", "95 % interval", f"minus {first} [°] (95 %)"),
             *("final distance [°]", "95 % interval", "trials above the goal"),
-            *("chosen in real: mean distance [°]", "95 % interval", "real episodes"),
+            *("chosen on the real side: mean distance [°]", "95 % interval", "real episodes"),
         )
         return table(titles, rows)
 
@@ -177,7 +178,10 @@ class Figure5:
         """Return the mean distances; an arm above the goal has failed."""
         failed = [trial.last[ABOVE] > 0.0 for trial in trials]
         return Drawn(
-            "mean distance in real [°], less is better", list(map(_on_average, trials)), failed, "above the goal"
+            "mean distance on the real side [°], less is better",
+            list(map(_on_average, trials)),
+            failed,
+            "above the goal",
         )
 
 
@@ -194,7 +198,7 @@ def _differences(trials: Sequence[Trial], task: Task, against: Sequence[str], *,
         places_of = (getattr(cell, name) for name in where.values())
         rows.append((*places_of, f"{cell.method} - {other}", str(cell.iteration), *apart, *counted))
     counted = ("falls of a trial", "95 % interval") if falls else ()
-    titles = ("difference", "iteration", f"in real [{task.unit}]", "95 % interval, paired by trial")
+    titles = ("difference", "iteration", f"on the real side [{task.unit}]", "95 % interval, paired by trial")
     return [table((*where, *titles, *counted), rows)] if rows else []
 
 

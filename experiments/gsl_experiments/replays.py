@@ -137,7 +137,7 @@ class Replays:
             reach = ask_reachability(env, acting, of_policy(held, pi0=False), drawn)
         after = replay_starts(env, acting, begins, drawn)
         env.close()
-        console.status("loading single joints in the air")
+        console.phase("loading single joints in the air")
         yielding = loads.yielding(scenario.world, acting, self.worlds[world])
         return Replay(
             world,

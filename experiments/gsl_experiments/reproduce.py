@@ -47,7 +47,7 @@ class Reproduce(Compare):
 
     kind: ClassVar[str] = "reproduce"
 
-    table: Annotated[PaperTable, setting("how the trials are told")] = field(kw_only=True)
+    table: Annotated[PaperTable, setting("how the trials are shown")] = field(kw_only=True)
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Say beforehand how long it takes, run all trials, write every trial's figures, the table and the picture.

@@ -52,7 +52,7 @@ class Figure6:
     kind: ClassVar[str] = "reproduce"
 
     iterate: Annotated[Iterate, setting("what the grounding is trained for")]
-    joint: Annotated[str, setting("joint that is told to move")] = "LShoulderPitch"
+    joint: Annotated[str, setting("joint that is commanded to move")] = "LShoulderPitch"
     change: Annotated[float, setting("command, from the start posture", unit="rad")] = -math.pi / 12
     duration: Annotated[float, setting("what is shown", unit="s", gt=0)] = 1.0
     preset_name: PresetName = ""

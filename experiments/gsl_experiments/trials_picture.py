@@ -44,7 +44,7 @@ def trials_figure(trials: Sequence[Trial], methods: Mapping[str, Grounding], dra
     for cell in dict.fromkeys(trial.cell for trial in trials):
         every = zip(trials, drawn.values, failures, strict=True)
         shown, failed = zip(*((value, failure) for trial, value, failure in every if trial.cell == cell), strict=True)
-        panel = f"{cell.simulator} as simulator, {cell.world} in real" if cell.simulator else cell.world
+        panel = f"{cell.simulator} as simulator, {cell.world} on the real side" if cell.simulator else cell.world
         name = f"{cell.method}, iteration {cell.iteration}" if further else cell.method
         panels.setdefault(panel, {})[name] = Dots(shown, failed, method_colour(methods[cell.method]))
     missed = drawn.missed or f"no {'sure' if tolerant else 'stable'} improvement{' by the iteration' * further}"

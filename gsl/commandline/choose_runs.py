@@ -6,6 +6,7 @@ import fnmatch
 import math
 import operator
 import re
+from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -20,6 +21,7 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.identity import flat
 from gsl.storage.references import RUNS, name_run
 
+LISTED = 12  # metrics in a message: what fits in two lines of a terminal
 ROLES = ("world", "sim", "real")
 _CONDITION = re.compile(r"([^<>=!]+?)(?:(<=|>=|==|!=|<|>)([^<>=!]+))?")
 _COMPARE: Mapping[str, Callable[[float, float], bool]] = {
@@ -144,13 +146,19 @@ def _check_metric(setting: str, name: str, runs: Sequence[Run], more: tuple[str,
     names = {metric for run in runs for metric in run.metrics}
     if runs and name not in names:
         ends = sorted(metric for metric in names if name in metric.split("."))[:3]
-        hint = f"; did you mean {' or '.join(ends)}?" if ends else _hint(name, {*names, *more})
-        raise ConfigError(setting, f"none of these artifacts has this metric{hint}", given=name)
+        near = f"; did you mean {' or '.join(ends)}?" if ends else did_you_mean(name, {*names, *more})
+        near = f"{near} There" if near.startswith("; did") else "; there"
+        raise ConfigError(setting, f"none of these artifacts has this metric{near} {_list(runs)}", given=name)
 
 
-def _hint(name: str, names: set[str]) -> str:
-    near = did_you_mean(name, names)
-    return near if near.startswith("; did") else "; gsl show REF --json lists those of an artifact"
+def _list(runs: Sequence[Run]) -> str:
+    """Return the metrics that there are: those of most artifacts, if they are many."""
+    counts = Counter(metric for run in runs for metric in run.metrics)
+    if not counts:
+        return "is none"
+    most = sorted(counts, key=lambda metric: (-counts[metric], metric.count("."), metric))[:LISTED]
+    rest = len(counts) - len(most)
+    return f"is {', '.join(most)}" + (f" and {rest} more, see gsl show REF --json" if rest else "")
 
 
 def _fits_name(name: str, pattern: str) -> bool:

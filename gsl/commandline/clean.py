@@ -43,8 +43,8 @@ def clean(words: Sequence[str], console: Console, *, yes: bool) -> int:
     if rows:
         console.table(f"{'removed' if yes else 'could go'} below {RUNS}/", ["what", "size", "why"], rows)
     what = f"{several(len(items) - len(kept), 'leftover')}, {total}"
-    told = f"{what} removed" if yes else f"{what} could go; --yes removes {'it' if len(items) == 1 else 'them'}"
+    outcome = f"{what} removed" if yes else f"{what} could go; --yes removes {'it' if len(items) == 1 else 'them'}"
     entries = [{"path": item.path, "bytes": item.bytes, "why": item.why, "in_use": item in kept} for item in items]
     document = {"removed": yes, "entries": entries, "bytes": sum(item.bytes for item in items)}
-    console.result(document, text=told if items else f"nothing below {RUNS}/ could go")
+    console.result(document, text=outcome if items else f"nothing below {RUNS}/ could go")
     return 1 if kept else 0

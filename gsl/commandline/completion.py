@@ -16,9 +16,9 @@ def complete(ctx: typer.Context, incomplete: str) -> list[str]:
     typed, words_of_bash = incomplete, os.environ.get("COMP_WORDS")
     if words_of_bash:
         typed = join_words(words_of_bash.split("\n"), int(os.environ.get("COMP_CWORD", "0")))
-    found = suggestions(name_of(ctx), typed, config_dir=user_folder(ctx))
+    matches = suggestions(name_of(ctx), typed, config_dir=user_folder(ctx))
     cut = len(typed) - len(incomplete.lstrip("="))
-    return [word[cut:] for word in found]
+    return [word[cut:] for word in matches]
 
 
 def name_of(ctx: typer.Context) -> str:

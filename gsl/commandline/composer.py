@@ -115,18 +115,18 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
         whole = _compose(command, [], trust)
         base, words = plain(whole), Vocabulary(_without_hydra(whole), _choices(whole))
         overrides = _parse(rewrite(arguments, words.chosen), multirun)
-        if choices := [_first_value(one) for one in overrides if _is_choice(one)]:
+        if choices := [_first_value(override) for override in overrides if _is_choice(override)]:
             words = replace(words, config=_without_hydra(_compose(command, choices, trust)))
-        signs = [_sign(one, words.config) for one in overrides]
+        signs = [_sign(override, words.config) for override in overrides]
         config = _compose(
-            command, [sign + _first_value(one) for sign, one in zip(signs, overrides, strict=True)], trust
+            command, [sign + _first_value(override) for sign, override in zip(signs, overrides, strict=True)], trust
         )
     except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
         raise unfit(command, arguments, unknown_key(error)) or translate(error, words) from error
     except ValueError as error:
         raise misshapen(arguments, error) from error
-    lines = tuple(f"{sign}{one.input_line}" for sign, one in zip(signs, overrides, strict=True))
-    swept = tuple(key_of(str(one.input_line)) for one in overrides if one.is_sweep_override())
+    lines = tuple(f"{sign}{override.input_line}" for sign, override in zip(signs, overrides, strict=True))
+    swept = tuple(key_of(str(override.input_line)) for override in overrides if override.is_sweep_override())
     composition = Composition(_without_hydra(config), lines, _choices(config), swept, trust)
     _check_effects(composition)
     _check_referred(command, composition)
@@ -160,13 +160,15 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
     for override in overrides:
         key, value = key_of(override), override.partition("=")[2]
         try:
-            parsed.append(one := parser.parse_overrides([override])[0])  # with the loader, which a glob asks
+            parsed.append(override_read := parser.parse_overrides([override])[0])  # with the loader, which a glob asks
         except HydraException as error:
             raise ConfigError(key, _unreadable(override, parser), given=value) from error
-        if one.is_sweep_override() and not multirun:
-            listed = f"; a list is written '{key}=[{value}]'" if one.is_choice_sweep() else ""
+        if override_read.is_sweep_override() and not multirun:
+            listed = f"; a list is written '{key}=[{value}]'" if override_read.is_choice_sweep() else ""
             raise ConfigError(key, f"several values need --multirun{listed}")
-        if _is_choice(one) and not (one.is_sweep_override() or isinstance(one.value(), str | list | dict)):
+        if _is_choice(override_read) and not (
+            override_read.is_sweep_override() or isinstance(override_read.value(), str | list | dict)
+        ):
             raise ConfigError(key.rpartition("@")[2], "takes the name of a file", given=value)
     return parsed
 
@@ -199,12 +201,12 @@ def _check_effects(composition: Composition) -> None:
 def _check_referred(command: str, composition: Composition) -> None:
     """Refuse a value of a recipe or preset that nothing of this command refers to: it would do nothing."""
     typed = [key for key in map(key_of, composition.overrides) if key.startswith(REFERRED)]
-    told = OmegaConf.to_yaml(composition.config) if typed else ""
+    text = OmegaConf.to_yaml(composition.config) if typed else ""
     for key in typed:
-        if f"${{{key}}}" not in told:
+        if f"${{{key}}}" not in text:
             last = key.rpartition(".")[2]
-            keys = [one for one in list_keys(composition.config) if not one.startswith(REFERRED)]
-            others = [one for one in keys if one.rpartition(".")[2] == last]
+            keys = [key for key in list_keys(composition.config) if not key.startswith(REFERRED)]
+            others = [key for key in keys if key.rpartition(".")[2] == last]
             hint = f"; did you mean {' or '.join(others[:3])}?" if others else ""
             raise ConfigError(key, f"nothing in gsl {command} refers to it here{hint}")
 
@@ -227,8 +229,8 @@ def _sign(override: Override, config: DictConfig) -> str:
         return ""
     above, _, mapping = parent.rpartition(".")
     around = _find_declared(config, above).get(mapping)
-    known = {*_find_declared(config, parent), *read_parts(_node(config, above)).get(mapping, {})}
-    return "++" if name in known or (around is not None and around.named) else ""
+    keys = {*_find_declared(config, parent), *read_parts(_node(config, above)).get(mapping, {})}
+    return "++" if name in keys or (around is not None and around.named) else ""
 
 
 def _find_declared(config: DictConfig, path: str) -> Mapping[str, Setting]:

@@ -12,7 +12,7 @@ from omegaconf.errors import OmegaConfBaseException
 from pydantic import AfterValidator, BeforeValidator
 
 from gsl.commandline.composer import Composition
-from gsl.commandline.config_errors import missing, resolution_error
+from gsl.commandline.config_errors import missing, of_the_command, resolution_error
 from gsl.commandline.expansion import check_expansion
 from gsl.commandline.known_settings import plain, read_declared
 from gsl.commandline.overrides import COMMAND_KEYS, file_of
@@ -108,14 +108,15 @@ def execute(
     from gsl.report.account import account
     from gsl.storage.artifact import build
 
-    stage, settings, own = prepare(config, trust)
-    if getattr(stage, "only_looks", False):
-        return dict(stage.look(console))
-    out = own.folder(command, level)
-    with executing(own.cluster):
-        artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
-    for told in account(artifact):
-        console.table(*told)
+    with console.at_work(command):
+        stage, settings, own = prepare(config, trust)
+        if getattr(stage, "only_looks", False):
+            return dict(stage.look(console))
+        out = own.folder(command, level)
+        with executing(own.cluster):
+            artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
+    for table in account(artifact):
+        console.table(*table)
     more: Callable[[Path], dict[str, Any]] = getattr(stage, "document", lambda folder: {})
     return {"folder": out.as_posix(), "unchanged": artifact.unchanged, "metrics": artifact.metrics, **more(out)}
 
@@ -135,9 +136,12 @@ def prepare(config: Mapping[str, Any], trust: Collection[str] = ()) -> tuple[Any
         raise missing(path)
     if TRUST in settings:
         settings[TRUST] = list(trust)
-    stage = restore(settings, trust=trust)
-    told = describe(stage)  # refuses what could not be written down afterwards
-    if own.cluster is not None and not any(name.rpartition(".")[2] == WORKERS for name in flat(told)):
+    try:
+        stage = restore(settings, trust=trust)
+    except ConfigError as error:
+        raise of_the_command(error, config) from error
+    described = describe(stage)  # refuses what could not be written down afterwards
+    if own.cluster is not None and not any(name.rpartition(".")[2] == WORKERS for name in flat(described)):
         raise ConfigError("executor", "this command gives nothing to workers; leave it out", given=own.executor)
     return stage, settings, own
 

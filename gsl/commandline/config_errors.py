@@ -5,17 +5,22 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from hydra.errors import MissingConfigException
 from omegaconf import DictConfig
 from omegaconf.errors import InterpolationToMissingValueError, MissingMandatoryValue
 
 from gsl.commandline.known_settings import list_keys
-from gsl.core.validation import did_you_mean
+from gsl.commandline.overrides import COMMAND_KEYS
+from gsl.core.validation import NO_SUCH, did_you_mean
 from gsl.errors import ConfigError, InputError
 
 _UNKNOWN = re.compile(r"Could not (?:override|delete from config\.) '([^']+)'")  # hydra's exception has no field for it
 _MERGED = "Error merging override "
+_FILE = re.compile(r"In '([^']+)'")  # in which a yaml file says something of another shape
+_ROUND = ("Recursive interpolation", "RecursionError")  # the second within an entry of a list
+_WRITE = "write the value itself"
 
 
 @dataclass(frozen=True)
@@ -39,7 +44,7 @@ def unknown_key(error: Exception) -> str | None:
 
 def unfit(command: str, arguments: Sequence[str], unknown: str | None) -> ConfigError | None:
     """Return the error for an experiment or task that sets what a command does not have, if that is the matter."""
-    typed = dict(one.lstrip("+").partition("=")[::2] for one in arguments)
+    typed = dict(argument.lstrip("+").partition("=")[::2] for argument in arguments)
     key = next((key for key in typed if key.rpartition(".")[2] in ("experiment", "task")), None)
     if unknown is None or unknown in typed or key is None:
         return None
@@ -60,13 +65,23 @@ def translate(error: Exception, words: Vocabulary) -> Exception:
         key, _, value = text.removeprefix(_MERGED).lstrip("+~").partition("=")
         shape = "a list or a mapping, another shape than what is there"
         return ConfigError(key, f"is {shape}; set single values below it, or take a file without it", given=value)
-    return InputError(f"configuration: {' '.join(text.split())}")
+    if file := _FILE.match(text):
+        return InputError(f"{file[1]}.yaml: says a list where settings by name are, or the other way round; mend that")
+    return InputError(f"configuration: {' '.join(text.split()) or 'holds what no setting can be, such as a set'}")
+
+
+def of_the_command(error: ConfigError, config: Mapping[str, Any]) -> ConfigError:
+    """Return a better error for what a file says of a component, such as a mapping, and is of the command itself."""
+    above, _, name = error.setting.rpartition(".")
+    if above and error.problem.startswith(NO_SUCH) and name in {*COMMAND_KEYS, *config}:
+        return ConfigError(error.setting, f"is a setting of the command, and not of {above}; type {name}=... yourself")
+    return error
 
 
 def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
     """Return the error for an argument that hydra stumbles over: a key in a list."""
     last = str(error).rpartition(" ")[2].strip("'")
-    keys = [key for one in arguments if last in (key := one.partition("=")[0].lstrip("+~")).split(".")]
+    keys = [key for argument in arguments if last in (key := argument.partition("=")[0].lstrip("+~")).split(".")]
     where = keys[0].rpartition(".")[0] if keys else "configuration"
     return ConfigError(where, "is a list of entries here, which have no names; set all of it: KEY=[{...}, {...}]")
 
@@ -79,7 +94,12 @@ def resolution_error(error: Exception) -> Exception:
     problem = str(error).splitlines()[0]
     if isinstance(error, InterpolationToMissingValueError):
         return missing(problem.rpartition(" ")[2])
-    return ConfigError(key, problem)
+    nowhere = re.search(r"key '([^']*)'", problem)
+    if nowhere is not None:
+        return ConfigError(key, f"refers to {nowhere[1].lstrip('.')}, and this command has no such setting; {_WRITE}")
+    if any(word in problem for word in _ROUND):
+        return ConfigError(key, f"refers to itself; {_WRITE}")
+    return ConfigError(key, f"refers to a setting in a way that cannot be read; {_WRITE}")
 
 
 def missing(key: str) -> ConfigError:
@@ -92,11 +112,11 @@ def _no_such_setting(key: str, words: Vocabulary) -> ConfigError:
     if roles:
         return ConfigError(key, f"here a {key} has a role; say {' or '.join(f'{role}=...' for role in roles)}")
     keys, last = list_keys(words.config), key.rpartition(".")[2]
-    deeper = [known for known in keys if known.rpartition(".")[2] == last]
+    deeper = [declared for declared in keys if declared.rpartition(".")[2] == last]
     if deeper:
         return ConfigError(key, f"no such setting; did you mean {' or '.join(deeper[:3])}?")
-    shown = [known for known in keys if not known.endswith("_target_")]
-    level = [known for known in shown if known.rpartition(".")[0] == key.rpartition(".")[0]]
-    level = level or [known for known in shown if "." not in known]
+    shown = [declared for declared in keys if not declared.endswith("_target_")]
+    level = [declared for declared in shown if declared.rpartition(".")[0] == key.rpartition(".")[0]]
+    level = level or [declared for declared in shown if "." not in declared]
     near = did_you_mean(key, keys)
     return ConfigError(key, "no such setting" + (near if "did you mean" in near else did_you_mean(key, level)))

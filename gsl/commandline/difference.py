@@ -1,14 +1,18 @@
-"""`gsl diff`: two artifacts side by side, what differs of their settings, parents, versions and metrics."""
+"""`gsl diff`: two artifacts side by side, what differs of settings, parents, versions, metrics and diagnosed causes."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
+from gsl.errors import ArtifactError
 from gsl.report.account import plain
 from gsl.report.console import Console
+from gsl.report.diagnosis_two import set_side_by_side, table_of_two
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
+from gsl.storage.diagnosis_report import REPORT, report_of
 from gsl.storage.hashing import SHORT
 from gsl.storage.identity import flat
 from gsl.storage.references import name_run, resolve_main
@@ -28,19 +32,19 @@ def compare(first: str, second: str, console: Console) -> None:
     Raises:
         ArtifactError: There is no such artifact, or it is damaged.
     """
-    one, other = (Artifact(folder, manifest.read(folder)) for folder in map(resolve_main, (first, second)))
-    made = one.manifest, other.manifest
+    left, other = (Artifact(folder, manifest.read(folder)) for folder in map(resolve_main, (first, second)))
+    made = left.manifest, other.manifest
     parents = [{parent.role: parent.hash[:SHORT] for parent in each.parents} for each in made]
     roles = parents[0].keys() & parents[1].keys()  # where such a parent lies is told by its contents
-    settings = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (one, other)]
+    settings = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (left, other)]
     software = [{**each.versions, "sources of gsl": each.sources[:SHORT], "kind": each.kind} for each in made]
     parts = {
         "settings": _differ(*settings),
         "made from": _differ(*parents),
         "software": _differ(*software),
-        "metrics": _differ(flat(one.metrics), flat(other.metrics)),
+        "metrics": _differ(flat(left.metrics), flat(other.metrics)),
     }
-    names = [name_run(each.folder) for each in (one, other)]
+    names = [name_run(each.folder) for each in (left, other)]
     for title, pairs in parts.items():
         if pairs:
             rows = [
@@ -48,10 +52,27 @@ def compare(first: str, second: str, console: Console) -> None:
             ]
             columns = [title, *names, *(["change"] if title == "metrics" else [])]
             console.table(f"{title}: {len(rows)} {'differ' if len(rows) > 1 else 'differs'}", columns, rows)
+    causes = _compare_diagnoses((left, other), (names[0], names[1]), console)
     same = not any(parts.values())
-    document = {"folders": [one.folder, other.folder], "same": same}
+    document = {**({"causes": causes} if causes else {}), "folders": [left.folder, other.folder], "same": same}
     text = f"{names[0]} and {names[1]}: the same settings, parents, software and metrics" if same else ""
     console.result({**document, **{title.replace(" ", "_"): pairs for title, pairs in parts.items()}}, text=text)
+
+
+def _compare_diagnoses(artifacts: tuple[Artifact, Artifact], names: Pair, console: Console) -> list[dict[str, Any]]:
+    """Show the causes of two diagnoses side by side; nothing of other artifacts."""
+    if any(artifact.manifest.kind != "diagnose" for artifact in artifacts):
+        return []
+    reports = _read_report(artifacts[0].folder), _read_report(artifacts[1].folder)
+    console.table(*table_of_two(*reports, names))
+    return set_side_by_side(*reports)
+
+
+def _read_report(folder: Path) -> dict[str, Any]:
+    try:
+        return report_of(folder)
+    except (OSError, ValueError) as error:
+        raise ArtifactError(folder / REPORT, "is damaged; diagnose again with force=true") from error
 
 
 def _differ(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Pair]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 
@@ -38,6 +39,8 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
         return f"{failure.filename}: {failure.strerror or text}", 1
     if (line := describe_own(failure)) is not None:
         return f"{line}; GSL_TRACEBACK=1 shows more", 1
+    if isinstance(failure, MemoryError) or isinstance(failure, OSError) and failure.errno == errno.ENOMEM:
+        return "there is not enough memory for this; free some, or try workers=1, or less at once", 1
     if isinstance(failure, OSError):
         return failure.strerror or text, 1
     if isinstance(failure, UnicodeEncodeError) and not is_text(failure.object):

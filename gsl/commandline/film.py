@@ -90,10 +90,11 @@ def render(reference: str, words: Sequence[str], console: Console) -> None:
     settings = make(Settings, read_settings(words, "render"))
     path = Path(settings.out)
     check_format(path)
-    cast = assemble(reference, settings, words, console)
+    with console.at_work("render"):
+        cast = assemble(reference, settings, words, console)
     with explain_refusal(path.parent):
         path.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(path) as temporary:
+    with replacing(path) as temporary, console.at_work("drawing the film"):
         named = temporary.with_name(temporary.name + path.suffix.lower())
         film(cast.robot, cast.joints, cast.shots, named, slow=settings.slow)
         named.rename(temporary)
@@ -195,12 +196,12 @@ def _search_of(measured: Artifact) -> Artifact | None:
     return None
 
 
-def _choose(found: Sequence[PolicyRecord], name: str) -> PolicyRecord:
+def _choose(stored: Sequence[PolicyRecord], name: str) -> PolicyRecord:
     """Return the policy of a name, the last one without."""
-    by_name = {record.name: record for record in found}
+    by_name = {record.name: record for record in stored}
     if name and name not in by_name:
         raise ConfigError("policy", f"there is none of this name{did_you_mean(name, by_name)}", given=name)
-    return by_name[name] if name else found[-1]
+    return by_name[name] if name else stored[-1]
 
 
 def _robot_in(world: Any) -> Robot:

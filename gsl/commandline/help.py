@@ -43,9 +43,9 @@ class Explanation:
     def defaults(self) -> dict[str, str]:
         """Dotted key of every setting and its default as text."""
         return {
-            f"{path}.{name}".lstrip("."): _text(known.default)
+            f"{path}.{name}".lstrip("."): _text(about.default)
             for path, settings in self.sections.items()
-            for name, known in settings.items()
+            for name, about in settings.items()
         }
 
 
@@ -58,27 +58,27 @@ def explain(command: str, typed: Sequence[str] = (), *, config_dir: Path | None 
         except GslError:
             composition = compose(command, [])
         keys = {choice.partition("@")[2] or choice: choice for choice in composition.chosen}
-        found = {key: options(choice.partition("@")[0]) for key, choice in keys.items()}
+        choices = {key: options(choice.partition("@")[0]) for key, choice in keys.items()}
         fitting = {"experiment", *map(str, composition.config)}  # groups without a default that it can choose from
-        found |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups() and group in fitting}
+        choices |= {group: options(group) for group in OPTIONAL_GROUPS if group in groups() and group in fitting}
         chosen = {key: composition.chosen[choice] for key, choice in keys.items()}
         try:
             values = resolve(composition)
         except ConfigError:
             values = plain(composition.config)
         text = OmegaConf.to_yaml(composition.config)
-        sections = dict(_sections(values, found))
+        sections = dict(_sections(values, choices))
         for group in REFERRED_GROUPS:
             if group in sections:
                 notes = _notes(group, chosen[group], config_dir)
                 sections[group] = {
-                    name: replace(one, meaning=notes.get(name, one.meaning))
-                    for name, one in sections[group].items()
+                    name: replace(about, meaning=notes.get(name, about.meaning))
+                    for name, about in sections[group].items()
                     if re.search(rf"\b{group}\.{name}\b", text)
                 }
         if not any(WORKERS in settings for settings in sections.values()):
-            sections[""] = {name: one for name, one in sections[""].items() if name not in EXECUTOR_KEYS}
-        return Explanation(found, chosen, {path: one for path, one in sections.items() if one})
+            sections[""] = {name: about for name, about in sections[""].items() if name not in EXECUTOR_KEYS}
+        return Explanation(choices, chosen, {path: section for path, section in sections.items() if section})
 
 
 def _notes(group: str, name: str, config_dir: Path | None) -> dict[str, str]:
@@ -86,7 +86,7 @@ def _notes(group: str, name: str, config_dir: Path | None) -> dict[str, str]:
     places = [folder / group / f"{name}.yaml" for folder in (config_dir, configuration_folder()) if folder]
     path = next((place for place in places if place.is_file()), None)
     lines = path.read_text(encoding="utf-8").splitlines() if path else []
-    return {found[1]: found[2] for line in lines if (found := NOTE.match(line))}
+    return {match[1]: match[2] for line in lines if (match := NOTE.match(line))}
 
 
 def write_help(command: str, typed: Sequence[str] = (), *, config_dir: Path | None = None) -> str:
@@ -108,21 +108,21 @@ def _merge(sections: Mapping[str, Mapping[str, Setting]]) -> Iterator[tuple[list
     """Yield settings with the paths that have the same ones; defaults that differ stand side by side."""
     alike: dict[frozenset[tuple[str, str]], list[str]] = {}
     for path, settings in sections.items():
-        alike.setdefault(frozenset((name, one.meaning) for name, one in settings.items()), []).append(path)
+        alike.setdefault(frozenset((name, about.meaning) for name, about in settings.items()), []).append(path)
     for paths in alike.values():
         first = sections[paths[0]]
         yield paths, [_side_by_side([sections[path][name] for path in paths]) for name in first]
 
 
 def _side_by_side(settings: Sequence[Setting]) -> Setting:
-    defaults = list(dict.fromkeys(_text(one.default) for one in settings))
+    defaults = list(dict.fromkeys(_text(about.default) for about in settings))
     return settings[0] if len(defaults) == 1 else replace(settings[0], default=" or ".join(defaults))
 
 
 def _sections(values: Mapping[str, Any], chosen: Mapping[str, Any]) -> Iterator[tuple[str, dict[str, Setting]]]:
     """Yield the stage's own settings first, then those of each component."""
     own = {key: value for key, value in values.items() if key not in chosen and not _is_component(value)}
-    commands = {name: known for name, known in settings_of(CommandSettings).items() if name not in own}
+    commands = {name: about for name, about in settings_of(CommandSettings).items() if name not in own}
     yield "", {**_describe(own, values), **commands}
     for key, value in values.items():
         if isinstance(value, Mapping) and (key in chosen or _is_component(value)):
@@ -137,17 +137,21 @@ def _component_sections(path: str, values: Mapping[str, Any]) -> Iterator[tuple[
 
 
 def _describe(shown: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Setting]:
-    known = read_declared(dict(values))
-    own = {**settings_of(CommandSettings), **known}
-    names = [name for name in [*shown, *known] if not name.startswith("_") and name not in values.keys() - shown.keys()]
+    declared = read_declared(dict(values))
+    own = {**settings_of(CommandSettings), **declared}
+    names = [
+        name for name in [*shown, *declared] if not name.startswith("_") and name not in values.keys() - shown.keys()
+    ]
     return {
         name: _with_default(own.get(name, Setting(name)), shown.get(name, REQUIRED)) for name in dict.fromkeys(names)
     }
 
 
-def _with_default(known: Setting, value: Any) -> Setting:
-    default = known.default if value is REQUIRED else value
-    return Setting(known.name, default, known.meaning, known.unit, known.source, known.lower, known.upper)
+def _with_default(declared: Setting, value: Any) -> Setting:
+    default = declared.default if value is REQUIRED else value
+    return Setting(
+        declared.name, default, declared.meaning, declared.unit, declared.source, declared.lower, declared.upper
+    )
 
 
 def _is_component(value: Any) -> bool:

@@ -73,21 +73,21 @@ def write_configuration(arguments: Sequence[str], worlds: Collection[str], conso
     Raises:
         InputError: A setting is wrong, the URDF cannot be read, or the folder is there already.
     """
-    told: Init = make(Init, _settings(arguments))
-    folder, urdf = Path(told.out or told.name), urdf_of(told.urdf)
-    if not re.fullmatch(r"[A-Za-z_][\w-]*", told.name):
+    asked: Init = make(Init, _settings(arguments))
+    folder, urdf = Path(asked.out or asked.name), urdf_of(asked.urdf)
+    if not re.fullmatch(r"[A-Za-z_][\w-]*", asked.name):
         raise ConfigError(
-            "name", "must be a word of letters, digits, _ and -, not beginning with a digit", given=told.name
+            "name", "must be a word of letters, digits, _ and -, not beginning with a digit", given=asked.name
         )
-    if told.name in {*worlds, *names()}:
-        raise ConfigError("name", "is that of a world or a robot that comes with gsl; take another", given=told.name)
+    if asked.name in {*worlds, *names()}:
+        raise ConfigError("name", "is that of a world or a robot that comes with gsl; take another", given=asked.name)
     if folder.exists():
         raise InputError(f"{folder}: exists; choose another folder with out=")
     description = read_description(urdf)
     hinges = {hinge.name: hinge for hinge in description.hinges}
-    added = {name: _stand_in(told, hinges.get(name)) for name in told.joints or drivable(description.hinges)}
+    added = {name: _stand_in(asked, hinges.get(name)) for name in asked.joints or drivable(description.hinges)}
     for key in ("effort", "velocity", "lower", "upper"):
-        if getattr(told, key) is not None and all(getattr(settings, key) is None for settings in added.values()):
+        if getattr(asked, key) is not None and all(getattr(settings, key) is None for settings in added.values()):
             problem = "stands in for what a URDF leaves open, and this one says it of every joint; edit the robot file"
             raise ConfigError(key, problem)
     try:
@@ -95,28 +95,28 @@ def write_configuration(arguments: Sequence[str], worlds: Collection[str], conso
     except ConfigError as error:
         raise InputError(f"{urdf}: {error}") from error
     joints = {name: {**_servo(robot, name), **_range(added[name])} for name in robot.controlled}
-    _write(folder, told, urdf, robot, joints, _effects(description, robot))
-    _tell(folder, told, robot, console)
+    _write(folder, asked, urdf, robot, joints, _effects(description, robot))
+    _tell(folder, asked, robot, console)
 
 
 def _settings(arguments: Sequence[str]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     for argument in arguments:
         key, equals, value = argument.partition("=")
         if not equals or not value:
             raise ConfigError(argument, "has no value; write key=value")
-        found[key] = value.strip("[]").split(",") if key == "joints" else value
-    return found
+        settings[key] = value.strip("[]").split(",") if key == "joints" else value
+    return settings
 
 
-def _stand_in(told: Init, hinge: Hinge | None) -> JointSettings:
+def _stand_in(asked: Init, hinge: Hinge | None) -> JointSettings:
     """Return what was told of a joint and its URDF does not say, or only by a placeholder."""
     if hinge is None:  # whoever makes a robot of it will say so
         return JointSettings()
     limit, slides = hinge.limit, hinge.slides
     missing = {key for key in ("effort", "velocity") if not is_limit(key, limit.get(key, 0.0), slides=slides)}
     missing |= set() if is_range(limit, slides=slides) else {"lower", "upper"}
-    return JointSettings(**{key: getattr(told, key) for key in missing})
+    return JointSettings(**{key: getattr(asked, key) for key in missing})
 
 
 def _range(settings: JointSettings) -> dict[str, float]:
@@ -126,34 +126,34 @@ def _range(settings: JointSettings) -> dict[str, float]:
 
 def _effects(description: Description, robot: Robot) -> str:
     """Return the friction that <dynamics> says of controlled joints, as effects of a world."""
-    found: dict[str, dict[float, list[str]]] = {}
+    frictions: dict[str, dict[float, list[str]]] = {}
     for hinge in description.hinges:
         for key, value in hinge.dynamics.items():
             if value > 0.0 and hinge.name in robot.controlled:
-                found.setdefault(key, {}).setdefault(value, []).append(hinge.name)
-    told = {
+                frictions.setdefault(key, {}).setdefault(value, []).append(hinge.name)
+    shared = {
         _DYNAMICS[key][0]: [{_DYNAMICS[key][1]: value, "joints": joints} for value, joints in values.items()]
-        for key, values in found.items()
+        for key, values in frictions.items()
     }
-    lines = [f"  {effect}: {_flow(entries)}" for effect, entries in told.items()]
+    lines = [f"  {effect}: {_flow(entries)}" for effect, entries in shared.items()]
     return "\n".join(["   # of <dynamics>", *lines]) if lines else " {}"
 
 
 def _write(
-    folder: Path, told: Init, urdf: Path, robot: Robot, joints: Mapping[str, Mapping[str, float]], effects: str
+    folder: Path, asked: Init, urdf: Path, robot: Robot, joints: Mapping[str, Mapping[str, float]], effects: str
 ) -> None:
     """Write the folder whole or not at all."""
     place = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
-    world = place / WORLD.format(told.name)
+    world = place / WORLD.format(asked.name)
     with explain_refusal(folder):
         try:
             world.parent.mkdir(parents=True)
-            seen = told.urdf if told.urdf.startswith(PREFIX) else Path(os.path.relpath(urdf, folder)).as_posix()
+            seen = asked.urdf if asked.urdf.startswith(PREFIX) else Path(os.path.relpath(urdf, folder)).as_posix()
             text = _robot_text(robot, urdf.name, seen, joints)
             (place / ROBOT).write_text(text, encoding="utf-8")
-            known = {"name": told.name, "robot": (folder / ROBOT).as_posix(), "period": told.period}
-            known["effects"] = effects
-            world.write_text(_WORLD_TEXT.format(**known), encoding="utf-8")
+            about = {"name": asked.name, "robot": (folder / ROBOT).as_posix(), "period": asked.period}
+            about["effects"] = effects
+            world.write_text(_WORLD_TEXT.format(**about), encoding="utf-8")
             os.rename(place, folder)
         finally:
             shutil.rmtree(place, ignore_errors=True)
@@ -176,8 +176,8 @@ def _robot_text(robot: Robot, name: str, urdf: str, values: Mapping[str, Mapping
 
 def _servo(robot: Robot, name: str) -> dict[str, float]:
     joint, (kp, kd) = robot.joint(name), robot.gains[name]
-    told = {"kp": kp, "kd": kd, "effort": joint.effort, "velocity": joint.max_velocity, "armature": joint.armature}
-    return {key: float(f"{value:.4g}") for key, value in told.items()}
+    numbers = {"kp": kp, "kd": kd, "effort": joint.effort, "velocity": joint.max_velocity, "armature": joint.armature}
+    return {key: float(f"{value:.4g}") for key, value in numbers.items()}
 
 
 def _flow(values: Any) -> str:
@@ -188,8 +188,8 @@ def _plain(text: str) -> str:
     return yaml.safe_dump(text, allow_unicode=True, width=1000).splitlines()[0]
 
 
-def _tell(folder: Path, told: Init, robot: Robot, console: Console) -> None:
-    name = told.name
+def _tell(folder: Path, asked: Init, robot: Robot, console: Console) -> None:
+    name = asked.name
     files = [(folder / part).as_posix() for part in (ROBOT, WORLD.format(name))]
     mine = shlex.quote(folder.as_posix())
     following = [
@@ -199,7 +199,7 @@ def _tell(folder: Path, told: Init, robot: Robot, console: Console) -> None:
     if not robot.slides:  # which no diagnosis takes yet
         following.append(f"gsl diagnose --config-dir {mine} sim={name} real=LOG name={name}   # a log of the real one")
     joints = f"{robot.name}: {len(robot.controlled)} controlled joints, {', '.join(robot.controlled)}"
-    period = f"its control period is {told.period:g} s; if your logs have another, write it into the world's file"
+    period = f"its control period is {asked.period:g} s; if your logs have another, write it into the world's file"
     lines = [joints, *(f"remark: {remark}" for remark in robot.remarks), *files, period, "", "what to type next:"]
     document = {"files": files, "joints": list(robot.controlled), "remarks": list(robot.remarks), "next": following}
     console.result(document, text="\n".join([*lines, *(f"  {line}" for line in following)]))

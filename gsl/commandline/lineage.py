@@ -31,10 +31,12 @@ def verify(reference: str | None, console: Console) -> int:
     folders = artifact_folders(reference)
     if not folders:
         raise ArtifactError(RUNS, "holds no artifact, so nothing is verified; go to the folder that runs/ lies in")
-    for folder in folders:
-        for one in lineage(folder, seen).all():
-            if one.problem and one.place not in wrong:
-                wrong[one.place] = one.problem
+    with console.progress(len(folders), "verifying artifacts") as progress:
+        for folder in folders:
+            for node in lineage(folder, seen).all():
+                if node.problem and node.place not in wrong:
+                    wrong[node.place] = node.problem
+            progress.advance()
     document = {"artifacts": len(folders), "problems": {place.as_posix(): why for place, why in wrong.items()}}
     if not wrong:
         console.result(document, text=f"{len(folders)} of {len(folders)} artifacts are as they were made")
@@ -56,7 +58,7 @@ def draw_lineage(reference: str, console: Console) -> int:
     """
     root = lineage(resolve(reference), {})
     console.draw(_tree(root))
-    wrong = [one for one in root.all() if one.problem]
+    wrong = [node for node in root.all() if node.problem]
     console.result(_document(root) | ({"exit_code": 1} if wrong else {}))
     if wrong and not console.json:
         return console.error(f"{wrong[0].place.as_posix()}: {wrong[0].problem}", 1, command="gsl lineage")

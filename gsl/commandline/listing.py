@@ -88,8 +88,8 @@ def show_artifact(reference: str, console: Console) -> int:
         parents = [_parent(folder, parent) for parent in artifact.manifest.parents]
         console.table("made from", ["role", "what", "contents", "now"], parents)
     with suppress(*[ArtifactError] * bool(damaged)):
-        for told in account(artifact):
-            console.table(*told)
+        for line in account(artifact):
+            console.table(*line)
         rows = [_setting(name, value) for name, value in artifact.config.items() if not name.startswith("_")]
         console.table("settings", ["setting", "value"], rows)
     files = [(name, size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]

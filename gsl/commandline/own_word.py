@@ -72,8 +72,8 @@ def modules_of(value: Any) -> tuple[str, ...]:
     words = value if isinstance(value, list | tuple) else [value]
     for word in words:
         if not isinstance(word, str) or not _MODULE.fullmatch(word) or word in _TRUTH:
-            given = str(word).lower() if isinstance(word, bool) else str(word)
-            raise ConfigError(TRUST, "names the modules whose code may run, such as trust=my_module", given=given)
+            text = str(word).lower() if isinstance(word, bool) else str(word)
+            raise ConfigError(TRUST, "names the modules whose code may run, such as trust=my_module", given=text)
     return tuple(words)
 
 
@@ -107,13 +107,13 @@ def _split_words(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:
         except (HydraException, ValueError, RecursionError):
             continue
         value = override._value
-        for one in value.list if isinstance(value, ChoiceSweep) else [value]:
-            yield override.key_or_group, _plain(one)
+        for choice in value.list if isinstance(value, ChoiceSweep) else [value]:
+            yield override.key_or_group, _plain(choice)
 
 
 def _plain(value: Any) -> Any:
     if isinstance(value, QuotedString):
         return value.text
     if isinstance(value, dict):
-        return {str(_plain(key)): _plain(one) for key, one in value.items()}
-    return [_plain(one) for one in value] if isinstance(value, list) else value
+        return {str(_plain(key)): _plain(entry) for key, entry in value.items()}
+    return [_plain(entry) for entry in value] if isinstance(value, list) else value

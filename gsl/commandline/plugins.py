@@ -51,7 +51,7 @@ class Commands(TyperGroup):
 
 def plugins() -> dict[str, EntryPoint]:
     """Return the entry points by the name of their command."""
-    return {one.name: one for one in entry_points(group=GROUP)}
+    return {entry_point.name: entry_point for entry_point in entry_points(group=GROUP)}
 
 
 def load(entry_point: EntryPoint) -> Any:
@@ -63,13 +63,13 @@ def load(entry_point: EntryPoint) -> Any:
     name = entry_point.name
     app = typer.Typer(rich_markup_mode=None)
     try:
-        found = entry_point.load()
-        if isinstance(found, typer.Typer):
-            app.add_typer(found, name=name)
-        elif inspect.isclass(found):
+        command = entry_point.load()
+        if isinstance(command, typer.Typer):
+            app.add_typer(command, name=name)
+        elif inspect.isclass(command):
             add_stage(app, name, summary(entry_point))
         else:
-            app.command(name)(found)
+            app.command(name)(command)
         return get_group(app).commands[name]
     except (Exception, SystemExit) as error:
         package = entry_point.dist.name if entry_point.dist else "?"
@@ -88,7 +88,7 @@ def is_group(name: str) -> bool:
 
 def packages() -> list[str]:
     """Return the packages that bring commands: they were installed, so their files may name what is in them."""
-    return sorted({name for one in plugins().values() if (name := _package(one))})
+    return sorted({name for entry_point in plugins().values() if (name := _package(entry_point))})
 
 
 def folders() -> list[Path]:
@@ -108,8 +108,8 @@ def summary(entry_point: EntryPoint) -> str:
         tree = ast.parse(file.read_text(encoding="utf-8"))
     except (OSError, SyntaxError, ValueError):
         return ""
-    named = [one for one in tree.body if getattr(one, "name", None) == entry_point.attr]
-    documented = [one for one in named if isinstance(one, ast.ClassDef | ast.FunctionDef)]
+    named = [node for node in tree.body if getattr(node, "name", None) == entry_point.attr]
+    documented = [node for node in named if isinstance(node, ast.ClassDef | ast.FunctionDef)]
     return (ast.get_docstring(documented[0] if documented else tree) or "").partition("\n")[0]
 
 

@@ -48,7 +48,8 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
     find_own_modules(trust)
     stage, config = _ask_beside(*rebuild(old, trust), folder)
     command = f"gsl rerun {folder.as_posix()}"
-    new = build(stage, config=config, out=place, command=command, force=False, console=console)
+    with console.at_work(command):
+        new = build(stage, config=config, out=place, command=command, force=False, console=console)
     rows = list(_compare(old, new))
     other = [name for name, _, same in rows if not same]
     document = {"folder": place, "differs": other, "compared": [name for name, _, _ in rows]}
@@ -83,9 +84,9 @@ def _beside(folder: Path) -> Path:
 def _compare(old: Artifact, new: Artifact) -> Iterator[tuple[str, str, bool]]:
     """Yield the name and new hash of each file of the payload and each artifact beside it, and if it is the same."""
     before, after = (
-        {name: file.sha256 for name, file in one.manifest.files.items() if Path(name).name not in CIRCUMSTANCES}
-        | {link.path: link.hash for link in one.manifest.links}
-        for one in (old, new)
+        {name: file.sha256 for name, file in artifact.manifest.files.items() if Path(name).name not in CIRCUMSTANCES}
+        | {link.path: link.hash for link in artifact.manifest.links}
+        for artifact in (old, new)
     )
     for name in sorted(before.keys() | after.keys()):
         yield name, after.get(name, "none"), before.get(name) == after.get(name)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gsl.commandline.own_word import find_own_modules
+from gsl.core.budget import is_plain
 from gsl.core.trust import modules_in
 from gsl.errors import InputError
 from gsl.report.console import Console
@@ -42,7 +43,7 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
         if shown:
             portrait(body, picture)
     about = f"{body.name}: {len(body.controlled)} controlled joints, {len(body.links)} links, {body.mass:.3f} kg"
-    told = [about, *(f"remark: {remark}" for remark in remarks), *files]
+    lines = [about, *(f"remark: {remark}" for remark in remarks), *files]
     document = {
         "robot": body.name,
         "mass_kg": body.mass,
@@ -50,12 +51,12 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
         "remarks": remarks,
         "files": files,
     }
-    console.result(document, text="\n".join(told))
+    console.result(document, text="\n".join(lines))
 
 
 def _check_free(model: Path, picture: Path | None, text: str) -> None:
     """Refuse to write over what is not of this robot: the same URDF, with a picture beside it, is written again."""
-    again = model.is_file() and not model.is_symlink() and model.read_bytes() == text.encode()
+    again = is_plain(model) and not model.is_symlink() and model.read_bytes() == text.encode()
     taken = [path for path in (model, picture) if path is not None and (path.exists() or path.is_symlink())]
     if taken and not again or picture is not None and picture.is_symlink():
         raise InputError(f"{taken[0]}: exists, and is not what would be written; move it, or say another out=")

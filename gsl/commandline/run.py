@@ -44,11 +44,12 @@ def run(
     flags = [*(["--multirun"] if multirun else []), *([f"--config-dir={config_dir}"] if config_dir else [])]
     line = shlex.join(["gsl", *command.split(), *flags, *overrides])
     with open_hydra(config_dir):
-        for reason in load_own_effects(config_dir, find_trust(overrides)):
-            console.status(f"left out: {reason}")
-        for module in find_misspelt(overrides):
-            console.status(f"warning: {TRUST}={module} is no module of this folder, nor of an installed package")
-        composition = compose(command, overrides, multirun=multirun)
+        with console.at_work(f"reading the settings of {command}"):
+            for reason in load_own_effects(config_dir, find_trust(overrides)):
+                console.status(f"left out: {reason}")
+            for module in find_misspelt(overrides):
+                console.status(f"warning: {TRUST}={module} is no module of this folder, nor of an installed package")
+            composition = compose(command, overrides, multirun=multirun)
         if cfg:
             console.result(resolve(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolve(composition))))
             return 0

@@ -11,6 +11,7 @@ from typer.core import TyperCommand
 
 from gsl.commandline.completion import CONFIG_DIR, complete, name_of, user_folder
 from gsl.core.visible import visible
+from gsl.report.console import Console
 
 TYPED = "gsl.typed"
 
@@ -83,7 +84,8 @@ def run_stage(
     name: str, overrides: list[str], *, multirun: bool, cfg: Shown | None, config_dir: Path | None, json: bool
 ) -> None:
     """Run the command of a stage and end with its exit code."""
-    from gsl.commandline.run import run
+    with Console(json=json).at_work(f"gsl {name} starts"):
+        from gsl.commandline.run import run
 
     show = cfg is not None
     code = run(name, overrides, multirun=multirun, cfg=show, config_dir=config_dir, json=json)

@@ -58,7 +58,8 @@ def view(reference: str, words: Sequence[str], console: Console) -> None:
     if path is not None and path.suffix.lower() != FORMAT:
         raise InputError(f"{path}: a recording is {FORMAT}; choose such a name with out=")
     check_viewer()
-    cast = _add_ghost(assemble(reference, settings, words, console), console)
+    with console.at_work("view"):
+        cast = _add_ghost(assemble(reference, settings, words, console), console)
     if path is None:
         record_shots(cast.robot, cast.joints, cast.shots, None)
     else:

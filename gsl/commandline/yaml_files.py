@@ -25,6 +25,7 @@ from gsl.errors import InputError
 
 USER = "gsl-user"
 _HYDRA = "hydra"
+_SELF = "_self_"
 _SELECT = "oc.select"  # a setting, or a value where there is none
 
 
@@ -64,6 +65,7 @@ def check_file(path: Path, name: str) -> dict[str, Any]:
     if not isinstance(tree, dict | None):
         raise InputError(f"{path}: holds no settings by name")
     settings = tree or {}
+    _check_shape(path, settings)
     package = ConfigSource._get_header_dict(text[:512]).get("package") or ""
     words = [*map(str, settings), *name.split("/"), package, *_words(settings.get("defaults"))]
     if any(_HYDRA in word for word in words):
@@ -79,11 +81,38 @@ def check_file(path: Path, name: str) -> dict[str, Any]:
     return settings
 
 
+def _check_shape(path: Path, settings: dict[Any, Any]) -> None:
+    """Refuse what hydra says nothing clear about: names that are no text, and defaults that are no list of files."""
+    for key in _keys(settings):
+        if not isinstance(key, str | int | float):
+            raise InputError(f"{path}: {key!r} is no name of a setting, which is a text")
+    files = settings.get("defaults", [])
+    if not isinstance(files, list) or not all(map(_is_default, files)) or files.count(_SELF) > 1:
+        raise InputError(f"{path}: its `defaults:` are no list of files, such as [nao_ideal, _self_]")
+
+
+def _is_default(entry: Any) -> bool:
+    """Whether an entry names a file, or one of a group, or several, or none; a reference does not."""
+    if isinstance(entry, dict) and len(entry) == 1:
+        files = next(iter(entry.values()))
+        names = files if isinstance(files, list) else [] if files is None else [files]
+    else:
+        names = [entry]
+    return all(isinstance(name, str) and "${" not in name for name in names)
+
+
+def _keys(value: Any) -> Iterator[Any]:
+    if isinstance(value, dict):
+        yield from value
+    for entry in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _keys(entry)
+
+
 def _words(value: Any) -> Iterator[str]:
     if isinstance(value, dict):
         yield from (str(key) for key in value)
-    for one in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
-        yield from _words(one)
+    for entry in value.values() if isinstance(value, dict) else value if isinstance(value, list) else ():
+        yield from _words(entry)
     if isinstance(value, str):
         yield value
 

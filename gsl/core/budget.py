@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import errno
 import json
+import math
+import os
 import signal
 import stat
 import threading
@@ -49,11 +51,14 @@ SECONDS = 10.0
 """Of CPU for a file or a configuration that should take less than one."""
 GROWTH = 1_500_000_000
 """Bytes by which the process may grow meanwhile."""
+_KERNEL = ("/proc/", "/sys/")  # folders of files that the kernel makes up
 _TICK = 0.05  # of CPU between two looks at what was taken [s]
 
 
-def check_file(path: Path, most: float) -> None:
+def check_file(path: Path, most: float = math.inf) -> None:
     """Refuse what is no plain file, or larger than allowed [bytes].
+
+    A device or a pipe may never end, and so may a file of the kernel, such as /proc/kmsg, though it is called plain.
 
     Raises:
         InputError: It says which.
@@ -62,10 +67,19 @@ def check_file(path: Path, most: float) -> None:
     about = path.stat()
     if stat.S_ISDIR(about.st_mode):
         raise IsADirectoryError(errno.EISDIR, "is a folder", str(path))
-    if not stat.S_ISREG(about.st_mode):
+    if not stat.S_ISREG(about.st_mode) or os.path.realpath(path).startswith(_KERNEL):
         raise InputError(f"{path}: is no plain file")
     if about.st_size > most:
         raise InputError(f"{path}: has {about.st_size:,} bytes; {most:,.0f} are read at most")
+
+
+def is_plain(path: Path) -> bool:
+    """Whether there is a file that can be read to its end."""
+    try:
+        check_file(path)
+    except (OSError, InputError):
+        return False
+    return True
 
 
 def read_text(path: Path, most: float = TEXT_BYTES) -> str:

@@ -16,10 +16,26 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import numba
+from numba.core import event
 from numba.core.caching import IndexDataCacheFile
+
+from gsl.core.compiling import count_compilation
 
 _HASH = hashlib.sha256().digest_size  # [bytes]
 F = TypeVar("F", bound=Callable[..., object])
+
+
+class _Compilations(event.Listener):
+    """Hears of every compilation, but not of what the cache has."""
+
+    def on_start(self, event: Any) -> None:
+        count_compilation(1)
+
+    def on_end(self, event: Any) -> None:
+        count_compilation(-1)
+
+
+event.register("numba:compile", _Compilations())
 
 
 def compile_kernel(function: F) -> F:

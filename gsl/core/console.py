@@ -40,6 +40,12 @@ class Console(Protocol):
     ) -> None:
         """Show a table of results."""
 
+    def at_work(self, name: str) -> AbstractContextManager[None]:
+        """Within, it is shown that work of this name goes on, from the first seconds on."""
+
+    def phase(self, name: str) -> None:
+        """Say what is done now, of which nobody knows how long it takes."""
+
     @property
     def is_planned(self) -> bool:
         """Whether it was said how long the work around takes, or nobody listens: a part of it says nothing then."""
@@ -73,6 +79,14 @@ class Silent:
         self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
     ) -> None:
         """Show nothing."""
+
+    @contextmanager
+    def at_work(self, name: str) -> Iterator[None]:
+        """Show nothing."""
+        yield
+
+    def phase(self, name: str) -> None:
+        """Say nothing."""
 
     @property
     def is_planned(self) -> bool:

@@ -43,15 +43,15 @@ def _side_by_side(typing_context: Any, array: Any) -> Any:
     result = types.Array(lanes, array.ndim - 1, "C", aligned=False)
 
     def generate(context: Any, builder: Any, sig: Any, arguments: Any) -> Any:
-        given, made = make_array(array)(context, builder, arguments[0]), make_array(result)(context, builder)
+        whole, made = make_array(array)(context, builder, arguments[0]), make_array(result)(context, builder)
         populate_array(
             made,
-            data=builder.bitcast(given.data, context.get_data_type(lanes).as_pointer()),
-            shape=cgutils.unpack_tuple(builder, given.shape)[:-1],
-            strides=cgutils.unpack_tuple(builder, given.strides)[:-1],
+            data=builder.bitcast(whole.data, context.get_data_type(lanes).as_pointer()),
+            shape=cgutils.unpack_tuple(builder, whole.shape)[:-1],
+            strides=cgutils.unpack_tuple(builder, whole.strides)[:-1],
             itemsize=context.get_constant(types.intp, 8 * LANES),
-            meminfo=given.meminfo,
-            parent=given.parent,
+            meminfo=whole.meminfo,
+            parent=whole.parent,
         )
         context.nrt.incref(builder, array, arguments[0])
         return made._getvalue()
@@ -102,9 +102,9 @@ def _define(function: Any, result: Any, arguments: int, build: Callable[..., Any
     class Typing(AbstractTemplate):
         key = function
 
-        def generic(self, given: Any, named: Any) -> Any:
-            fits = len(given) == arguments and all(one == lanes or isinstance(one, _PLAIN) for one in given)
-            return signature(result, *[lanes] * arguments) if fits and lanes in given else None
+        def generic(self, types_of: Any, named: Any) -> Any:
+            fits = len(types_of) == arguments and all(kind == lanes or isinstance(kind, _PLAIN) for kind in types_of)
+            return signature(result, *[lanes] * arguments) if fits and lanes in types_of else None
 
     infer_global(function, types.Function(Typing))
     lower_builtin(function, *[lanes] * arguments)(lambda context, builder, _, values: build(context, builder, *values))
@@ -166,9 +166,9 @@ _define(max, lanes, 2, _better(">"))
 
 @infer_global(where)
 class _Where(AbstractTemplate):
-    def generic(self, given: Any, named: Any) -> Any:
-        kind = lanes if lanes in given or given[0] == mask else types.float64
-        return signature(kind, given[0], kind, kind)
+    def generic(self, types_of: Any, named: Any) -> Any:
+        kind = lanes if lanes in types_of or types_of[0] == mask else types.float64
+        return signature(kind, types_of[0], kind, kind)
 
 
 @lower_builtin(where, mask, lanes, lanes)

@@ -16,6 +16,8 @@ from gsl.errors import ConfigError
 
 T = TypeVar("T")
 
+NO_SUCH = "no such setting"
+"""What an error of a setting that is none begins with."""
 _UNEXPECTED = re.compile(r"unexpected keyword argument '(\w+)'")
 _ADDRESS = re.compile(r" (object )?at 0x[0-9a-f]+")  # in memory: it says nothing
 _RULES = {
@@ -63,7 +65,7 @@ def make(target: Callable[..., T], values: Mapping[str, Any], *, where: str = ""
             name = ".".join(filter(None, [where, TARGET]))
             raise ConfigError(name, f"cannot be made of its settings ({error})", given=_name_of(target)) from error
         name = ".".join(filter(None, [where, unexpected[1]]))
-        raise ConfigError(name, f"no such setting{did_you_mean(unexpected[1], settings_of(target))}") from error
+        raise ConfigError(name, f"{NO_SUCH}{did_you_mean(unexpected[1], settings_of(target))}") from error
 
 
 def config_error(error: ValidationError, target: Callable[..., Any], *, where: str = "") -> ConfigError:
@@ -74,7 +76,7 @@ def config_error(error: ValidationError, target: Callable[..., Any], *, where: s
     location += [str(part) for part in details["loc"][1:] if isinstance(part, int)]
     path = ".".join([*filter(None, [where]), *location])
     if details["type"] == "unexpected_keyword_argument":
-        return ConfigError(path, f"no such setting{did_you_mean(location[-1], settings_of(target))}")
+        return ConfigError(path, f"{NO_SUCH}{did_you_mean(location[-1], settings_of(target))}")
     setting = settings_of(target).get(location[0]) if location else None
     unit = f" ({setting.unit})" if setting is not None and setting.unit else ""
     return ConfigError(path or target.__name__, f"{_problems(complaints)}{unit}", given=_quote(details["input"]))
@@ -110,6 +112,8 @@ def _problem(details: ErrorDetails) -> str:
     if details["type"] in _RULES:
         return _RULES[details["type"]].format(**context)
     kind = _KINDS.get(details["type"].split("_")[0])
+    if kind == "a text" and isinstance(details["input"], int | float):  # a folder called 20
+        return f"must be a text; in quotes inside those of the shell it is: '\"{_quote(details['input'])}\"'"
     return f"must be {kind}" if kind else details["msg"][0].lower() + details["msg"][1:]
 
 

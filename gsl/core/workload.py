@@ -8,8 +8,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from gsl.core.compiling import is_compiling
 from gsl.core.words import duration, falls
 
+COMPILING = "compiling, once after an installation"
 PRIOR = 0.05  # of the whole work: so much of it has to be done until the clock counts as much as the plan
 
 
@@ -59,12 +61,16 @@ class Loop:
 
     def __init__(self, work: Workload, total: int, description: str) -> None:
         self._work, self._total, self._description = work, total, description
-        self._begun, self._done, self._worked, self._falls = work.clock(), 0, 0, 0
+        self._begun: float | None = None  # when its first step was done, whose time is that of compilation
+        self._done, self._worked, self._falls = 0, 0, 0
 
     def advance(self, steps: int = 1, *, worked: bool = True) -> None:
         """Note that `steps` more are done; without work if they were done before."""
         self._done += steps
-        self._worked += steps * worked
+        if worked and self._begun is None:
+            self._begun = self._work.clock()
+        elif worked:
+            self._worked += steps
         self._work.step(steps, worked=worked)
 
     def fell(self, count: int) -> None:
@@ -77,7 +83,7 @@ class Loop:
 
     def words(self) -> list[str]:
         """Return how far it is, and how fast."""
-        passed = self._work.clock() - self._begun
+        passed = 0.0 if self._begun is None else self._work.clock() - self._begun
         rate = self._worked / passed if passed > 0.0 else 0.0
         speed = f"{rate:.1f} a second" if rate >= 1.0 else f"{1.0 / rate:.1f} s each" if rate else ""
         return [f"{self._description}: {self._done} of {self._total}", speed]
@@ -95,8 +101,9 @@ class Workload:
         self._changed = changed
         self._plans: list[Plan] = []
         self._loop: Loop | None = None
-        self._alone = False
+        self._alone = self._warm = False
         self._share = self._free = self._begun = self._last = 0.0
+        self._phase, self._entered = "", 0.0
 
     @contextmanager
     def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:
@@ -104,12 +111,27 @@ class Workload:
         if not self._plans:
             self._share = self._free = 0.0
             self._begun = self._last = self.clock()
-            self.best = ""
+            self.best, self._warm = "", False
         self._plans.append(Plan(noun, parts))
         try:
             yield
         finally:
             self._plans.pop()
+
+    @contextmanager
+    def at_work(self, name: str) -> Iterator[None]:
+        """Within, the work has this name wherever nobody knows more of it."""
+        before = self._phase, self._entered
+        self._phase, self._entered = name, self.clock()
+        try:
+            yield
+        finally:
+            self._phase, self._entered = before
+
+    def enter(self, phase: str) -> None:
+        """Name what is done now; how long it takes is not known."""
+        self._phase, self._entered = phase, self.clock()
+        self._changed()
 
     @property
     def is_planned(self) -> bool:
@@ -120,13 +142,14 @@ class Workload:
         """Name the part that begins."""
         if self._plans and not self._alone:
             self._plans[-1].name = name
+            self._phase = ""
             self._changed()
 
     def finish(self, *, worked: bool = True) -> None:
         """Note that a part is done; without work if it was done before."""
         if self._plans and not self._alone:
             plan = self._plans[-1]
-            plan.at, plan.steps, plan.name = plan.at + 1, 0, ""
+            plan.at, plan.steps, plan.name, self._phase = plan.at + 1, 0, "", ""
             self._move(worked=worked)
 
     @contextmanager
@@ -157,7 +180,10 @@ class Workload:
         return self._share
 
     def left(self) -> float | None:
-        """Return how long the rest takes [s], None if that cannot be said yet."""
+        """Return how long the rest takes [s], None if that cannot be said yet.
+
+        The first step that was worked does not count: its time is that of compilation, and of workers that start.
+        """
         seconds = self._plans[0].seconds if self._plans else 0.0
         prior = PRIOR if seconds else 0.0
         weight = self._share - self._free + prior
@@ -169,12 +195,12 @@ class Workload:
     def text(self) -> str:
         """Return in a line where the work is, how much is done, how fast it goes and what has come out."""
         plans, loop, left = [*self._plans], self._loop, self.left()
-        if not plans:
-            return ""
-        whole = [f"{100.0 * self._share:.0f} % done"] if plans[0].parts else []
-        whole += [] if left is None else [f"{duration(left)} left"]
-        places = [*(plan.words() for plan in plans if plan.noun), *(loop.words() if loop else ())]
-        outcome = [self.best, loop.falls() if loop else ""]
+        whole = [f"{100.0 * self._share:.0f} % done"] if plans and plans[0].parts else []
+        whole += [f"about {duration(left)} left"] if left and left >= 0.5 else []  # nobody knows once it is over
+        phase = [] if loop or not self._phase else [self._phase, duration(self.clock() - self._entered)]
+        places = [*(plan.words() for plan in plans if plan.noun), *(loop.words() if loop else phase)]
+        places += [COMPILING] if is_compiling() else []
+        outcome = [self.best, loop.falls() if loop else ""] if plans else []
         return "; ".join(filter(None, (", ".join(filter(None, words)) for words in (whole, places, outcome))))
 
     def _move(self, *, worked: bool) -> None:
@@ -183,6 +209,9 @@ class Workload:
             inside = plan.share(inside)
         moved = max(0.0, inside - self._share)
         self._share += moved
-        self._free += 0.0 if worked else moved
         self._last = self.clock()
+        if not (worked and self._warm):
+            self._free += moved
+        if worked and not self._warm:
+            self._begun, self._warm = self._last, True
         self._changed()

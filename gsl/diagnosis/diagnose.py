@@ -72,10 +72,11 @@ def diagnose(
     laws = learn_laws(log, problem.simulator, chosen.effects, chosen.fit.shifts, options.verdict.law)
     missing = laws.missing if laws else 0.0
     if options.duels and not log.walking and chosen.candidates:
-        tick("self-test: can the causes that are left be told apart")
+        tick("self-test: can the causes that are left be separated")
         trials = duel(log, problem, rivals, options)
     verdict = _judge(log, rivals, trials, options).judge(selection, missing)
-    forms = find_forms(log, problem.simulator, options.verdict.law) if missing > 1.0 else ()
+    lacking = verdict.word == "unknown" and missing > 1.0
+    forms = find_forms(log, problem.simulator, options.verdict.law) if lacking else ()
     tested = null_gains, tuple(trials)
     return Findings(log, problem, selection, verdict, *tested, baseline, shift, refuted, laws, forms, options)
 

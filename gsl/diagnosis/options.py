@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Annotated, Any, Literal
@@ -15,8 +14,6 @@ from gsl.core.setting import setting
 from gsl.diagnosis.settings import DesignSettings, PlausibilitySettings, SearchSettings, VerdictSettings
 from gsl.effects.effect import effect_class
 from gsl.errors import ConfigError
-
-QUIET = 15.0  # of a phase after which it says how far it is [s]
 
 
 def _check_names(effects: tuple[str, ...]) -> tuple[str, ...]:
@@ -82,21 +79,13 @@ class Options:
 
 
 class PhaseReporter:
-    """Reports a phase when it begins, and now and then how long it has worked; nothing goes on after a Ctrl-C."""
+    """Reports a phase when it begins; nothing goes on after a Ctrl-C."""
 
     def __init__(self, console: Console) -> None:
-        self._console, self._phase, self._fits = console, "", 0
-        self._start = self._last = time.monotonic()
+        self._console = console
 
-    def __call__(self, phase: str) -> None:
+    def __call__(self, phase: str = "") -> None:
         """Begin a phase; without a word, some work of it is done."""
-        now = time.monotonic()
-        if phase:
-            self._console.status(phase)
-            self._phase, self._fits, self._start, self._last = phase, 0, now, now
-            return
         checkpoint()
-        self._fits += 1
-        if now - self._last > QUIET:
-            self._console.status(f"{self._phase}: {self._fits} fits in {now - self._start:.0f} s")
-            self._last = now
+        if phase:
+            self._console.phase(phase)

@@ -27,6 +27,17 @@ class FloorSettings:
 
 
 @dataclass(frozen=True)
+class RepeatSettings:
+    """When two records are of the same motion: their commands, as functions of time, are the same."""
+
+    same: float = 2e-3  # difference of commands that is rounding [rad]: a step of 4,096 in a turn is 1.5e-3
+    of_range: float = 0.02  # share of a joint's range by which that of a repeat may differ: its peaks fall between rows
+    outside: float = 0.02  # share of the rows in which commands may differ by more than a row's time makes them
+    apart: float = 2.0  # by which loggers may have begun at different times [s]
+    share: float = 0.8  # of the longer record that both have to have
+
+
+@dataclass(frozen=True)
 class LogSettings:
     """How a log is cut into windows and parted for fitting and checking."""
 
@@ -40,6 +51,7 @@ class LogSettings:
     block: int = 2  # windows side by side that are held out together, where motions have no names: 1.2 s
     base_floor: tuple[float, ...] = (1e-3, 1e-3, 1e-3, 2e-3, 2e-3, 2e-3)  # of x, y, z [m], roll, pitch, yaw. Estimate
     floor: FloorSettings = field(default_factory=FloorSettings)
+    repeats: RepeatSettings = field(default_factory=RepeatSettings)
 
 
 @dataclass(frozen=True)
@@ -189,6 +201,7 @@ class VerdictSettings:
     limit_rounds: int = 3  # of its fits
     asked: float = 0.05  # command [rad],
     stuck: float = 0.1  # and share of it, below which a joint that moves less does not move
+    beneath: float = 0.7  # such a cost of all and of each joint leaves nothing to explain: noise makes 0.9 at least
     rough: float = 20.0  # remaining cost of a residual, in that of noise, from which on a tolerance is advised
     left: float = 0.1  # share of the held-out excess that is left, from which on something else is at work
     law: LawSettings = field(default_factory=LawSettings)

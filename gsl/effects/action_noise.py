@@ -25,7 +25,7 @@ class ActionNoise:
     rank: ClassVar[int] = 5
 
     sd: Annotated[float, setting("standard deviation", unit="rad", ge=0, lower=0.0, upper=0.04,
-                                 source="our worlds: .02 asks for as much margin as a worn robot")]  # fmt: skip
+                                 source="our worlds: 0.02 asks for as much margin as a worn robot")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

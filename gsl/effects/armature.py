@@ -24,7 +24,7 @@ class Armature:
     rank: ClassVar[int] = 2
 
     inertia: Annotated[float, setting("added inertia", unit="kg·m²", lower=0.0, upper=0.05,
-                                      source="HULKs' NAO model: .045 in all; ours: .002-.016")]  # fmt: skip
+                                      source="HULKs' NAO model: 0.045 in all; ours: 0.002-0.016")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

@@ -24,7 +24,7 @@ class Backlash:
     rank: ClassVar[int] = 6
 
     width: Annotated[float, setting("full width of the play", unit="rad", ge=0, lower=0.0, upper=0.03,
-                                    source="Webots DARwIn-OP .01; worn NAOs reach .09-.14 (B-Human)")]  # fmt: skip
+                                    source="Webots DARwIn-OP 0.01; worn NAOs reach 0.09-0.14 (B-Human)")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

@@ -24,7 +24,7 @@ class CoulombFriction:
     rank: ClassVar[int] = 2
 
     torque: Annotated[float, setting("friction torque, below 0 less", unit="N·m", lower=0.0, upper=0.3,
-                                     source="HULKs .03 on the NAO; Rhoban/bam .013-.104 on Dynamixels")]  # fmt: skip
+                                     source="HULKs 0.03 on the NAO; Rhoban/bam 0.013-0.104 on Dynamixels")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

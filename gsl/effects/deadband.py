@@ -25,7 +25,7 @@ class Deadband:
     rank: ClassVar[int] = 3
 
     width: Annotated[float, setting("half width of the errors that are ignored", unit="rad", ge=0, lower=0.0,
-                                    upper=0.03, source="estimate; STS3215 sets 0-32 ticks, .05")]  # fmt: skip
+                                    upper=0.03, source="estimate; STS3215 sets 0-32 ticks, 0.05")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

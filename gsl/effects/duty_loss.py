@@ -24,7 +24,7 @@ class DutyLoss:
     rank: ClassVar[int] = 9
 
     coefficient: Annotated[float, setting("share of the torque lost at the torque limit", ge=0, le=1, lower=0.0,
-                                          upper=0.5, source="estimate: gears and drivers lose .05-.5")]  # fmt: skip
+                                          upper=0.5, source="estimate: gears and drivers lose 0.05-0.5")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

@@ -24,7 +24,7 @@ class GainFade:
     rank: ClassVar[int] = 10
 
     rate: Annotated[float, setting("share of kp lost in a second", unit="1/s", ge=0, lower=0.0, upper=0.02,
-                                   source="estimate: .0005 while warming, then quicker")]  # fmt: skip
+                                   source="estimate: 0.0005 while warming, then quicker")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

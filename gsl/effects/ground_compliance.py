@@ -24,7 +24,7 @@ class GroundCompliance:
     stiffness: Annotated[float, setting("force per depth of a contact point", unit="N/m", gt=0, lower=2e3, upper=1e5,
                                         source="estimate: turf to floor; at 1e3 a NAO falls")]  # fmt: skip
     damping: Annotated[float, setting("force per speed of a contact point", unit="N·s/m", ge=0, lower=10.0, upper=300.0,
-                                      source="estimate: .1 to 2 of the critical damping")] = 100.0  # fmt: skip
+                                      source="estimate: 0.1 to 2 of the critical damping")] = 100.0  # fmt: skip
 
     def apply(self, plant: Plant) -> Plant:
         """Return the plant on softer ground; one ground on another is two springs in series, as are their dampers."""

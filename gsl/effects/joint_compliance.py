@@ -25,7 +25,7 @@ class JointCompliance:
     rank: ClassVar[int] = 1
 
     compliance: Annotated[float, setting("angle per torque", unit="rad/(N·m)", ge=0, lower=0.0, upper=0.03,
-                                         source="estimate: .002-.03")]  # fmt: skip
+                                         source="estimate: 0.002-0.03")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

@@ -25,7 +25,7 @@ class LoadFriction:
     rank: ClassVar[int] = 5
 
     coefficient: Annotated[float, setting("friction torque per torque in the gear", ge=0, lower=0.0, upper=0.4,
-                                          source="Rhoban/bam: XL330 .07-.29, STS3215 .05-.30")]  # fmt: skip
+                                          source="Rhoban/bam: XL330 0.07-0.29, STS3215 0.05-0.30")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

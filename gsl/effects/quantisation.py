@@ -24,7 +24,7 @@ class Quantisation:
     rank: ClassVar[int] = 4
 
     step: Annotated[float, setting("what targets are rounded to", unit="rad", ge=0, lower=0.0, upper=0.01,
-                                   source="12 bits a turn are .0015 (NAO, STS3215), XL320: .0051")]  # fmt: skip
+                                   source="12 bits a turn are 0.0015 (NAO, STS3215), XL320: 0.0051")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

@@ -25,7 +25,7 @@ class SensorBias:
     rank: ClassVar[int] = 1
 
     bias: Annotated[float, setting("added to the logged positions", unit="rad", lower=-0.07, upper=0.07,
-                                   source="estimate: .5-4 degrees, as zero_offset")]  # fmt: skip
+                                   source="estimate: 0.5-4 degrees, as zero_offset")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

@@ -24,9 +24,9 @@ class StribeckFriction:
     rank: ClassVar[int] = 4
 
     torque: Annotated[float, setting("friction torque at rest", unit="N·m", ge=0, lower=0.0, upper=0.3,
-                                     source="Rhoban/bam: .01 (XL330) to .12 (STS3215)")]  # fmt: skip
+                                     source="Rhoban/bam: 0.01 (XL330) to 0.12 (STS3215)")]  # fmt: skip
     velocity: Annotated[float, setting("speed at which 37 % of it are left", unit="rad/s", gt=0, lower=0.05, upper=0.5,
-                                       source="estimate; Rhoban/bam: .02-.08 on STS servos, 2.6 on XL330",
+                                       source="estimate; Rhoban/bam: 0.02-0.08 on STS servos, 2.6 on XL330",
                                        )] = 0.1  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 

@@ -24,7 +24,7 @@ class SupplySag:
     rank: ClassVar[int] = 8
 
     resistance: Annotated[float, setting("of the supply that all motors share", unit="Ω", ge=0, lower=0.0, upper=1.0,
-                                         source="estimate: .1-1 with cables and a worn battery")]  # fmt: skip
+                                         source="estimate: 0.1-1 with cables and a worn battery")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

@@ -22,7 +22,7 @@ class UnevenGround:
     rank: ClassVar[int] = 3
 
     height: Annotated[float, setting("greatest height", unit="m", ge=0, le=0.1, lower=0.0, upper=0.01,
-                                     source="our measurement: π0 begins to fall at .01")]  # fmt: skip
+                                     source="our measurement: π0 begins to fall at 0.01")]  # fmt: skip
     spacing: Annotated[float, setting("distance of the grid points", unit="m", ge=0.02, le=1.0, lower=0.05, upper=0.3,
                                       source="estimate: a third of a sole to two soles")] = 0.1  # fmt: skip
 

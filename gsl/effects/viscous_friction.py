@@ -24,7 +24,7 @@ class ViscousFriction:
     rank: ClassVar[int] = 3
 
     coefficient: Annotated[float, setting("torque per speed, below 0 less", unit="N·m·s/rad", lower=0.0, upper=1.1,
-                                          source="HULKs' NAO model 1.08; Rhoban/bam .004-.08 without back-EMF",
+                                          source="HULKs' NAO model 1.08; Rhoban/bam 0.004-0.08 without back-EMF",
                                           )]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 

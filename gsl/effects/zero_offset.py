@@ -25,7 +25,7 @@ class ZeroOffset:
     rank: ClassVar[int] = 3
 
     offset: Annotated[float, setting("added to the target", unit="rad", lower=-0.07, upper=0.07,
-                                     source="estimate: .5-4 degrees")]  # fmt: skip
+                                     source="estimate: 0.5-4 degrees")]  # fmt: skip
     joints: Annotated[Scope, setting(SCOPE)] = "all"
 
     def apply(self, plant: Plant) -> Plant:

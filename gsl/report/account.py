@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import shlex
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from gsl.errors import InputError
 from gsl.models.free_run import TICKS
 from gsl.report.audit import audit_table
 from gsl.report.diagnosis_text import summary_lines
-from gsl.report.evaluation_cells import cells, columns
+from gsl.report.evaluation_cells import cells, columns, outcomes_beside
 from gsl.report.headline import unit_of
 from gsl.report.markdown import read_table
 from gsl.report.tables import Table
@@ -53,7 +54,10 @@ def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
         "control period [s]": f"{metrics['control_period']:g}",
     }
     caption = "; ".join([metrics["time"], f"velocities {metrics['velocity']}", *metrics["warnings"]])
-    return Table("imported trajectories", tuple(row), [tuple(map(str, row.values()))], caption)
+    log = shlex.quote(str(folder))
+    following = f"what to type next, with a simulator of the robot as sim:\n  gsl audit real={log} sim=...\n"
+    following += f"  gsl diagnose real={log} sim=..."
+    return Table("imported trajectories", tuple(row), [tuple(map(str, row.values()))], f"{caption}\n{following}")
 
 
 def _of_states(metrics: Mapping[str, Any], what: str) -> Table | None:
@@ -141,7 +145,7 @@ def evaluation_table(document: Mapping[str, Any], unit: Unit) -> tuple[tuple[str
     """Return titles and rows of what evaluation.json holds."""
     phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
     named = [(row, f"{row['name']}{purpose}") for phase, purpose in phases.items() for row in document[phase]]
-    outcomes = list(dict.fromkeys(name for row, _ in named for name in row["outcome"]))
+    outcomes = outcomes_beside([row for row, _ in named], unit)
     rows = [tuple(cells(row | {"interval": _bounds(row["interval"])}, name, unit, outcomes)) for row, name in named]
     return tuple(columns(outcomes, unit)), rows
 
@@ -161,7 +165,9 @@ def describe_choice(metrics: Mapping[str, Any], unit: Unit) -> str:
     bounds = unit.interval(gain["interval"], sign=True)
     values = f"{unit.format(after['value'])}, {unit.describe_ends(after)}; π0 {unit.format(before['value'])}"
     worth = f"on fresh episodes {values}; gain {unit.format(gain['value'], sign=True)}, 95 % interval {bounds}"
-    doubt = "" if gain["interval"][0] > 0.0 else ", not surely a gain" if gain["value"] > 0.0 else ": worse than π0"
+    doubt = (
+        "" if gain["interval"][0] > 0.0 else ", which is not significant" if gain["value"] > 0.0 else ": worse than π0"
+    )
     return f"{metrics['best']} is returned: {worth}{doubt}; {spent}"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import sys
+import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, redirect_stdout, suppress
 from functools import cached_property
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 _log = logging.getLogger("gsl")
 
 SECONDS_BETWEEN_LINES = 10.0
+SILENCE = 1.0  # of a command after which a first line says what it does [s]; many are done before
+PULSE = 0.25  # between looks whether a line is due [s]
 WIDTH_WITHOUT_TERMINAL = 200
 BAR = 60  # characters
 
@@ -60,7 +63,7 @@ class Console:
         self._lines: LineTable | None = None
         self._part = ""
         self._work = Workload(self._note_progress)
-        self._said = self._work.clock()
+        self._said, self._pulse = self._work.clock(), False
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
@@ -108,7 +111,8 @@ class Console:
     def draw(self, thing: rich.console.RenderableType) -> None:
         """Print what rich can draw on stdout; with JSON it is left to `result`."""
         if not self.json:
-            self._stdout.print(thing, soft_wrap=True)
+            place = self._stderr if self._live is not None and self._stdout.is_terminal else self._stdout
+            place.print(thing, soft_wrap=True)
 
     def result(self, document: Mapping[str, Any], *, text: str = "") -> None:
         """Print the outcome: the document as JSON, or `text` for a person."""
@@ -131,6 +135,18 @@ class Console:
                 sys.stdout.flush()
             sys.stderr.write(f"{visible(command)}: {message}\n")
         return exit_code
+
+    @contextmanager
+    def at_work(self, name: str) -> Iterator[None]:
+        """Within, it is shown that work of this name goes on, from the first seconds on."""
+        self._said = self._work.clock() + SILENCE - SECONDS_BETWEEN_LINES
+        with self._work.at_work(visible(name)), self._watch():
+            yield
+
+    def phase(self, name: str) -> None:
+        """Say what is done now, of which nobody knows how long it takes."""
+        _log.info("%s", visible(name))
+        self._work.enter(visible(name))
 
     @property
     def is_planned(self) -> bool:
@@ -175,9 +191,13 @@ class Console:
 
     @contextmanager
     def _watch(self) -> Iterator[None]:
-        """Within, a terminal shows how far the work is."""
-        if self._live is not None or self.quiet or not self._stderr.is_terminal or self._stderr.is_dumb_terminal:
+        """Within, it is shown how far the work is, whether or not the work itself says anything."""
+        if self._live is not None or self._pulse or self.quiet:
             yield
+            return
+        if not self._stderr.is_terminal or self._stderr.is_dumb_terminal:
+            with self._pulsate():
+                yield
             return
         from rich.live import Live
 
@@ -186,6 +206,25 @@ class Console:
                 yield
             finally:
                 self._live = None
+
+    @contextmanager
+    def _pulsate(self) -> Iterator[None]:
+        """Within, lines are printed while the work says nothing, such as when it compiles."""
+        over, self._pulse = threading.Event(), True
+
+        def look() -> None:
+            while not over.wait(PULSE):
+                with suppress(OSError):  # nobody reads stderr any more
+                    self._say_progress()
+
+        thread = threading.Thread(target=look, daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            self._pulse = False
+            over.set()
+            thread.join()
 
     def _draw_progress(self) -> rich.console.Group:
         from rich.console import Group
@@ -198,19 +237,25 @@ class Console:
             shown.append(self._growing.draw(self._stderr.width))
         if words := self._work.text():
             below = Table.grid()
-            below.add_row(ProgressBar(total=1.0, completed=self._work.share, width=min(BAR, self._stderr.width)))
+            if self._work.share:
+                below.add_row(ProgressBar(total=1.0, completed=self._work.share, width=min(BAR, self._stderr.width)))
             below.add_row(Text(visible(self._title(words))))
             shown.append(below)
         return Group(*shown)
 
     def _note_progress(self) -> None:
         checkpoint()
+        self._say_progress()
+
+    def _say_progress(self) -> None:
         now = self._work.clock()
-        if self._live is None and not self.quiet and now - self._said >= SECONDS_BETWEEN_LINES:
+        if self._live is not None or self.quiet or now - self._said < SECONDS_BETWEEN_LINES:
+            return
+        if text := self._work.text():
             self._said = now
             if self._lines is not None:
                 self._lines.interrupted = True
-            self._stderr.print(visible(self._title(self._work.text())), markup=False, highlight=False, soft_wrap=True)
+            self._stderr.print(visible(self._title(text)), markup=False, highlight=False, soft_wrap=True)
 
     def _title(self, title: str) -> str:
         return f"{self._part}: {title}" if self._part else title

@@ -23,8 +23,8 @@ def limits(document: Document) -> Markup | None:
     ]
     note = (
         "If the causes are right and nothing else is at work: more of an effect, in all joints alike, makes held-out "
-        "replays surely worse. To a factor of 1.4; one joint alone may have more, and another model of the servos says "
-        "something else."
+        "replays significantly worse. To a factor of 1.4; one joint alone may have more, and another model of the "
+        "servos says something else."
     )
     columns = ("effect", "parameter", "at most", "looked for up to")
     return section("What else there may be", table(columns, rows) if rows else None, note=note)

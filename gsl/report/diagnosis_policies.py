@@ -25,8 +25,9 @@ def policies(document: Document) -> Markup | None:
     columns = ["policy", *(title for heading in titles for title in (heading, "95 % interval")), "falls"]
     cells = [[read_word(row, "name"), *_cells(row, form), _falls(row)] for row in rows]
     note = (
-        "Returns of the same policies in three worlds, counted as in real. Both simulators play the same seeds. A "
-        "simulator in which policies can be chosen has its dots on the thin line, or at least in the right order."
+        "Returns of the same policies in three worlds, counted as on the real side. Both simulators "
+        "play the same seeds. A simulator in which policies can be chosen has its dots on the thin line, "
+        "or at least in the right order."
     )
     return section(
         "Policies",

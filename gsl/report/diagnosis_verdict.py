@@ -141,8 +141,8 @@ def where_sentence(document: Document) -> str:
     of = len({read_word(cell, "joint") for cell in entries(document, "where")})
     whole = [place for place in named if place.cell.get("named")]
     parts = [f"{place.joint} when {place.when}" for place in named if place not in whole]
-    within = " The others are not surely beyond the noise." if of > len(named) else ""
-    only = f" Surely beyond the noise only at times: {list_words(parts)}." if parts else ""
+    within = " The others are not significantly beyond the noise." if of > len(named) else ""
+    only = f" Significantly beyond the noise only at times: {list_words(parts)}." if parts else ""
     if not whole:
         return f"No joint stands out as a whole.{only}{within}"
     first, *others = (f"{place.joint} {share(place.cell.get('share'))}" for place in whole)

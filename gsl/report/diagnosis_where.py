@@ -37,7 +37,7 @@ def where(document: Document) -> Markup | None:
     columns = ("joint", "share of the excess", "95 % interval", "gap / noise", "most when")
     note = (
         "Share of the excess, the part of the gap that noise does not explain, by joint and by what the joint did; a "
-        "moment may count in several columns. Framed: surely more than noise. Grey: within the noise."
+        "moment may count in several columns. Framed: significantly more than noise. Grey: within the noise."
     )
     return section(
         "Where the gap lies",

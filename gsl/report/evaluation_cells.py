@@ -11,9 +11,19 @@ from gsl.core.unit import Unit
 from gsl.core.words import in_unit
 
 
+def outcomes_beside(rows: Sequence[Mapping[str, Any]], unit: Unit) -> list[str]:
+    """Return the outcomes that rows have, but for one that is their value under another name."""
+    names = dict.fromkeys(name for row in rows for name in row["outcome"])
+
+    def differs(name: str, row: Mapping[str, Any]) -> bool:
+        return name in row["outcome"] and f"{row['outcome'][name]:.1f}" != unit.bare(row["value"])
+
+    return [name for name in names if any(differs(name, row) for row in rows)]
+
+
 def columns(outcomes: Sequence[str], unit: Unit) -> list[str]:
     """Return the titles of `cells`."""
-    places = [in_unit(place, unit.name) for place in ("in simulation", "in real")]
+    places = [in_unit(place, unit.name) for place in ("in simulation", "on the real side")]
     return ["policy", *places, "95 % interval", ends(unit), *outcomes]
 
 

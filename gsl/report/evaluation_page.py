@@ -32,7 +32,8 @@ def write_evaluation_page(
     if metrics["best_generation"]:
         after, before, gain = (metrics[key] for key in ("returned", "baseline", "gain"))
         sentence, sure = describe_gain(metrics["best"], after, before, gain, unit)
-    answer = Answer(question, sentence, sure)
+    broken = (metrics.get("promise") or {}).get("warning", "")
+    answer = Answer(question, sentence, sure, [f"{broken[0].upper()}{broken[1:]}."] if broken else [])
     columns, rows = evaluation_table(document, unit)
     searched = search("all policies", document, shown=unit.factor, returned=metrics["best"], start="π0")
     spent = [(words, str(sum(row["episodes"] for row in document[phase]))) for phase, words in _PHASES.items()]

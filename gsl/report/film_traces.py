@@ -11,7 +11,8 @@ from gsl.report.shown import scale_of
 from gsl.report.style import COMMAND, look
 
 HEIGHT, DPI = 130, 100  # [pixels], [1/in]
-LEFT, RIGHT, NARROW = 64, 200, 600  # margins; a film without room for a legend [pixels]
+LEFT, RIGHT, NARROW = 48, 200, 600  # margins; a film without room for a legend [pixels]
+LETTER, TIME = 8.0, 100  # widths of a letter, the most, and of what else is on the line of a joint's name [pixels]
 
 
 def draw_traces(
@@ -45,7 +46,8 @@ def draw_traces(
             way = factor * shot.trajectory.position[:, joint]
             axes.plot(shot.trajectory.time, way, color=shot.colour, linewidth=1.4, label=shot.where or shot.who)
         axes.set_xlim(0.0, max(float(shot.trajectory.time[-1]) for shot in shots))
-        axes.set_ylabel(f"{joints[joint]} [{unit}]", fontsize=8)
+        title = f"{shorten(joints[joint], (right - LEFT - TIME) / LETTER)} [{unit}]"
+        figure.text(LEFT / width, 0.03, title, fontsize=8)  # upright it would not fit beside so low a picture
         axes.tick_params(labelsize=8)
         figure.text(right / width, 0.03, "time [s]", fontsize=8, ha="right")
         if labelled:
@@ -54,3 +56,9 @@ def draw_traces(
     picture = np.asarray(canvas.buffer_rgba())  # type: ignore[no-untyped-call]
     picture = picture[..., :3].copy()
     return picture, lambda moment: float(axes.transData.transform((moment, 0.0))[0])
+
+
+def shorten(name: str, most: float) -> str:
+    """Return a name of `most` letters, without its middle if it is longer: both of its ends tell joints apart."""
+    half = max(2, (int(most) - 1) // 2)
+    return name if len(name) <= most else f"{name[:half]}…{name[-half:]}"

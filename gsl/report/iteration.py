@@ -38,7 +38,7 @@ class Rounds:
     @property
     def columns(self) -> tuple[str, ...]:
         """Titles of the rows."""
-        places = ("in simulation", "in real", "95 % interval", ends(self._unit))
+        places = ("in simulation", "on the real side", "95 % interval", ends(self._unit))
         return ("iteration", "policy", *places, "gain over the last", "real episodes")
 
     @property
@@ -101,7 +101,8 @@ class Rounds:
         of = f" by iteration {1 + self._done.index(self.best)}" if len(self._done) > 1 else ""
         fell = f"{after['falls']} falls in " if unit.falls else ""
         end = f"{fell}{after['episodes']} fresh episodes. {self._end}{cost}"
-        return f"In real: π0 {unit.bare(before['value'])}, returned{of} {unit.format(after['value'])}, {last}, {end}"
+        values = f"π0 {unit.bare(before['value'])}, returned{of} {unit.format(after['value'])}"
+        return f"On the real side: {values}, {last}, {end}"
 
     @property
     def _end(self) -> str:

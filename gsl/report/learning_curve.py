@@ -178,9 +178,9 @@ def _draw(axes: Axes, search: Search, gap: float) -> None:
     axes.set_xlabel("generation")
     axes.set_xticks([point.generation for point in search.points])
     axes.set_xlim(-0.4, max(1, last) + 0.4)
-    ends = [(start.real, f"{search.start} in real", COMMAND)]
+    ends = [(start.real, f"{search.start} on the real side", COMMAND)]
     ends += [(simulated[-1][1], "best in\nsimulation", SIMULATION)] if simulated else []
-    ends += [(standing[-1].real, "the same\nin real", REAL)] if standing and standing[-1].generation > 0 else []
+    ends += [(standing[-1].real, "the same,\nreal side", REAL)] if standing and standing[-1].generation > 0 else []
     ends += [(search.confirmed.real, "chosen,\nmeasured again", INK)] if search.confirmed else []
     label_ends(axes, axes.get_xlim()[1], ends, gap=gap)
 
@@ -206,7 +206,7 @@ def _draw_falls(axes: Axes, fallen: Sequence[Point]) -> None:
     low, high = axes.get_ylim()
     places, strip = [point.generation for point in fallen], low + 0.05 * (high - low)
     axes.plot(places, [strip] * len(places), "x", color=REAL, markersize=8, markeredgewidth=2.0, label="fell")
-    _say(axes, "fell in real", sum(places) / len(places), strip, 9, REAL)
+    _say(axes, "fell on the real side", sum(places) / len(places), strip, 9, REAL)
 
 
 def _draw_confirmed(axes: Axes, confirmed: Point) -> None:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 if TYPE_CHECKING:
     import jinja2
@@ -16,6 +16,7 @@ Part = str | None
 """Text, which is escaped, markup, or nothing."""
 
 _UNPRINTABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\ud800-\udfff\u202a-\u202e\u2066-\u2069]")
+_CODE = re.compile(r"`([^`]+)`")
 _BEFORE_UNIT = re.compile(r"(?<=\d) (?=[%×]|(?:ms|s|kg|N·m|cm/s)\b)")
 
 
@@ -56,9 +57,9 @@ def _fill(macro: str, *arguments: object) -> Markup:
     return Markup(getattr(environment().get_template("parts.html").module, macro)(*arguments))
 
 
-def prose(text: str) -> str:
-    """Return a sentence that keeps numbers and their units in one line; not for what is to be copied."""
-    return _BEFORE_UNIT.sub("\u00a0", text)
+def prose(text: str) -> Markup:
+    """Return a sentence as markup: what stands in `backticks` is code, and numbers keep their units in one line."""
+    return Markup(_CODE.sub(r"<code>\1</code>", str(escape(_BEFORE_UNIT.sub("\u00a0", text)))))
 
 
 def join(*parts: Part) -> Markup:

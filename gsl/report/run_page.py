@@ -13,13 +13,14 @@ from gsl.report.footfalls import Walk, footfall_figure
 from gsl.report.joint_trace import Traces, joint_trace_figure
 from gsl.report.learning_curve import Search, learning_curve_figure
 from gsl.report.page import page
-from gsl.report.parts import Part, choice, command, element, facts, fold, prose, section, table
+from gsl.report.parts import Part, bullets, choice, command, element, facts, fold, join, prose, section, table
 from gsl.report.svg import WIDTH, svg
 from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.origin import Origin, origin
 
 MARKS = {"good": "✓", "doubt": "?"}
 LONG = 12  # rows of a lineage that are shown at once
+_NOTHING = Markup("")
 PARAMETERS = 40  # of a policy that are listed, the most changed first
 
 
@@ -81,19 +82,28 @@ class Change(NamedTuple):
 
 
 def write_page(folder: Path, answer: Answer, sections: Sequence[Part]) -> None:
-    """Write the page of a run: the sections, and how it came about."""
+    """Write the page of a run: the sections, what was warned of, and how it came about."""
+    how = origin()
     kind = "good" if answer.sure else "doubt"
+    summary = [prose(line) for line in answer.more]
     text = page(
         "base.html",
-        [*sections, *describe_origin(origin())],
+        [warnings(how, join(*summary, *sections)), *sections, *describe_origin(how)],
         title=answer.sentence,
         kind=kind,
         mark=MARKS[kind],
         kicker=answer.question,
         headline=prose(answer.sentence),
-        summary=[prose(line) for line in answer.more],
+        summary=summary,
     )
     (folder / PAGE).write_text(text, encoding="utf-8")
+
+
+def warnings(how: Origin | None, shown: Markup = _NOTHING) -> Markup | None:
+    """Return the section with what a terminal was warned of and the page does not show yet; none where that is all."""
+    lines = [line.rstrip(".") for line in (how.warnings if how else ())]
+    new = [line for line in lines if prose(line)[1:] not in shown]
+    return section("Warnings", bullets([prose(f"{line[:1].upper()}{line[1:]}.") for line in new]))
 
 
 def describe_origin(how: Origin | None) -> list[Part]:

@@ -11,11 +11,23 @@ from gsl.robots.frames import euler
 
 def read_origin(node: xml.Element) -> tuple[np.ndarray, np.ndarray]:
     """Return the place [m], shape (3,), and the turn, shape (3, 3), of what has an <origin>, or none."""
-    origin = node.find("origin")
+    origin = find_only(node, "origin")
     if origin is None:
         return np.zeros(3), np.eye(3)
     place = read_numbers(origin.get("xyz", "0 0 0"), 3, "xyz of an <origin>")
     return np.array(place), euler(*read_numbers(origin.get("rpy", "0 0 0"), 3, "rpy of an <origin>"))
+
+
+def find_only(node: xml.Element, tag: str) -> xml.Element | None:
+    """Return the element of an element, None if there is none.
+
+    Raises:
+        ValueError: There are several, and it is not said which of them counts.
+    """
+    elements = node.findall(tag)
+    if len(elements) > 1:
+        raise ValueError(f"has {len(elements)} <{tag}> where one counts; keep one")
+    return elements[0] if elements else None
 
 
 def read_number(node: xml.Element | None, key: str, where: str, missing: float | None = None) -> float:

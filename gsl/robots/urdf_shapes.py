@@ -10,7 +10,7 @@ from gsl.core.body import MESH, Shape
 from gsl.robots.frames import rpy
 from gsl.robots.mesh_files import find_mesh
 from gsl.robots.meshes import can_read
-from gsl.robots.urdf_numbers import read_number, read_numbers, read_origin
+from gsl.robots.urdf_numbers import find_only, read_number, read_numbers, read_origin
 
 FORMS = ("box", "sphere", "cylinder", MESH)
 _GREY = (0.75, 0.77, 0.8)
@@ -55,9 +55,13 @@ class Looks:
         return tuple(dict.fromkeys(self._colliding))
 
     def _shape(self, node: xml.Element, *, collides: bool) -> list[Shape]:
-        form = next((form for kind in FORMS if (form := node.find(f"geometry/{kind}")) is not None), None)
-        if form is None:
+        geometry = find_only(node, "geometry")
+        forms = [form for form in geometry if form.tag in FORMS] if geometry is not None else []
+        if not forms:
             return []
+        if len(forms) > 1:
+            raise ValueError(f"a <geometry> has {len(forms)} shapes where one counts; keep one")
+        form = forms[0]
         (x, y, z), turn = read_origin(node)
         place = (float(x), float(y), float(z))
         bare = Shape(form.tag, (1.0, 1.0, 1.0), place, collides, self._colour_of(node), turn=rpy(turn))
@@ -88,13 +92,13 @@ class Looks:
         return []
 
     def _colour_of(self, node: xml.Element) -> tuple[float, float, float]:
-        material = node.find("material")
+        material = find_only(node, "material")
         own = None if material is None else _colour(material) or self._colours.get(material.get("name"))
         return own or _GREY
 
 
 def _colour(material: xml.Element) -> tuple[float, float, float] | None:
-    colour = material.find("color")
+    colour = find_only(material, "color")
     if colour is None:
         return None
     red, green, blue, _ = read_numbers(colour.get("rgba", ""), 4, "rgba of a <color>")

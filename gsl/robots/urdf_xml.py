@@ -15,7 +15,7 @@ from gsl.core.body import Link
 from gsl.core.budget import JOINTS, URDF_BYTES, check_file, within
 from gsl.core.validation import did_you_mean
 from gsl.errors import InputError
-from gsl.robots.urdf_numbers import read_number, read_numbers, read_origin
+from gsl.robots.urdf_numbers import find_only, read_number, read_numbers, read_origin
 from gsl.robots.urdf_remarks import remarks
 from gsl.robots.urdf_shapes import Looks
 
@@ -168,14 +168,15 @@ def _each(root: xml.Element, tag: str, read: Callable[[str, xml.Element], T]) ->
 
 
 def _link(looks: Looks, name: str, node: xml.Element) -> Link:
-    inertial = node.find("inertial")
+    inertial = find_only(node, "inertial")
     shapes = looks.read(node)
     if inertial is None:
         return Link(name, 0.0, np.zeros(3), np.zeros((3, 3)), shapes)
     com, turn = read_origin(inertial)
-    mass = read_number(inertial.find("mass"), "value", "<mass>")
+    mass = read_number(find_only(inertial, "mass"), "value", "<mass>")
+    tensor = find_only(inertial, "inertia")
     xx, xy, xz, yy, yz, zz = (
-        read_number(inertial.find("inertia"), f"i{pair}", "<inertia>") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
+        read_number(tensor, f"i{pair}", "<inertia>") for pair in ("xx", "xy", "xz", "yy", "yz", "zz")
     )
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if mass < 0.0:
@@ -190,19 +191,19 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
     if kind not in KINDS:
         raise ValueError(f"type '{kind}' is not supported; there are {', '.join(KINDS)}")
     parent, child = (
-        end.get("link", "") if (end := node.find(role)) is not None else "" for role in ("parent", "child")
+        end.get("link", "") if (end := find_only(node, role)) is not None else "" for role in ("parent", "child")
     )
     if not (parent and child):
         raise ValueError("names no parent or no child link")
-    axis = node.find("axis")
+    axis = find_only(node, "axis")
     way = np.array(read_numbers(axis.get("xyz", ""), 3, "axis") if axis is not None else (1.0, 0.0, 0.0))
     if kind != "fixed" and not np.linalg.norm(way) > 1e-9:
         raise ValueError("its axis has no direction")
-    limit, mimic = node.find("limit"), node.find("mimic")
+    limit, mimic = find_only(node, "limit"), find_only(node, "mimic")
     limits = {
         key: read_number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None
     }
-    safety, follows = node.find("safety_controller"), None
+    safety, follows = find_only(node, "safety_controller"), None
     soft = {
         key: read_number(safety, name, "<safety_controller>")
         for key, name in _SOFT.items()
@@ -214,7 +215,7 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
         )
         follows = (mimic.get("joint", ""), ratio, offset)
     unit = way / np.linalg.norm(way) if way.any() else np.array([1.0, 0.0, 0.0])
-    drag = node.find("dynamics")
+    drag = find_only(node, "dynamics")
     dynamics = {
         key: read_number(drag, key, "<dynamics>")
         for key in ("damping", "friction")

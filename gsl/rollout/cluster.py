@@ -78,15 +78,13 @@ class Cluster:
     def _connect(self, workers: int) -> Any:
         if self._client is not None:
             return self._client
-        from distributed import Client, LocalCluster
+        from distributed import Client
 
         for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in LOUD]:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         with processes_starting():
             if self._address is None:
-                self._local = LocalCluster(
-                    n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL + 1
-                )
+                self._local = _start_here(workers)
             self._ask()  # a client whose scheduler is not there says so when it is too late
             self._client = Client(self._local or self._address, timeout=CONNECT, set_as_default=False)
         return self._client
@@ -182,3 +180,21 @@ def _run(work: bytes, frozen: bytes, folder: str, own: bool, sources: str) -> by
                 return pickle.dumps((function(frozen, job), None))
         except Exception as failure:
             return pickle.dumps((None, failure))
+
+
+def _start_here(workers: int) -> Any:
+    """Return a cluster of processes of this machine, which nobody else can reach.
+
+    Raises:
+        GslError: Its workers do not start.
+    """
+    from distributed import LocalCluster
+
+    try:
+        return LocalCluster(
+            n_workers=workers, threads_per_worker=1, dashboard_address=None, silence_logs=logging.CRITICAL + 1,
+            scheduler_kwargs={"dashboard_address": "127.0.0.1:0"},  # else it takes port 8787, and warns if it is taken
+        )  # fmt: skip
+    except RuntimeError as error:
+        advice = "look at free memory; a script that calls gsl does so below `if __name__ == '__main__':`"
+        raise GslError(f"dask cannot start its workers here ({error}); {advice}") from error

@@ -41,6 +41,6 @@ def promise(
     room = ROOM * abs(value)
     broken = upper is not None and math.isfinite(upper) and value > upper + room
     returned = policy if best else policies[0].name
-    comparison = f"{returned} gives {unit.format(measured['value'])} in real, {unit.format(upper)} at most (95 %)"
-    warning = f"the search promised {unit.format(value)} ({policy}), but {comparison}" if broken else ""
+    reached = f"{unit.format(measured['value'])} on the real side, {unit.format(upper)} at most (95 %)"
+    warning = f"the search promised {unit.format(value)} ({policy}), but {returned} gives {reached}" if broken else ""
     return {"policy": policy, "value_sim": value, "value": measured["value"], "upper": upper, "warning": warning}

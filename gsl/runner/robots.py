@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.budget import TEXT_BYTES, check_file
 from gsl.runner.guard import Guard
 from gsl.runner.senses import RobotError
 
@@ -21,6 +22,7 @@ def robot_of(path: Path) -> Any:
     """
     if not path.is_file():
         raise RobotError(f"{path} does not exist; --robot names the file with read() and send(), --dry-run needs none")
+    check_file(path, TEXT_BYTES)
     spec = importlib.util.spec_from_file_location("robot", path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -45,7 +45,7 @@ class Audit:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write audit.json."""
-        audit = audit_log(read_logs(self.real), self.sim, self.real)
+        audit = audit_log(read_logs(self.real), self.sim, self.real, console)
         document = {**audit.document(), "summary": audit.summary, "sim": self.sim.robot, "real": self.real}
         documents.write_json(folder / REPORT, document)
         kinds = [finding["kind"] for finding in document["findings"]]
@@ -57,12 +57,13 @@ class Audit:
         return document
 
 
-def audit_log(batch: Batch, sim: BulletWorld, name: str) -> Found:
+def audit_log(batch: Batch, sim: BulletWorld, name: str, console: Console) -> Found:
     """Audit a log that a diagnosis, too, would take.
 
     Raises:
         InputError: It is of another robot, or its gains cannot be.
     """
+    console.phase("looking at the wiring")
     check_joints(batch, lump(sim.plant.robot), name)
     sim = with_logged_gains(sim, [episode.sensors for episode in batch.episodes], name)
     return audit(batch, sim.plant, sim.step, checkpoint)

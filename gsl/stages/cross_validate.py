@@ -16,6 +16,7 @@ from gsl.core.other_commands import find_other_commands
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.transitions import usable
+from gsl.core.workload import Part
 from gsl.diagnosis.diagnose import diagnose, prepare
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
@@ -128,7 +129,8 @@ class CrossValidate:
                 lengths = [usable(episode) for episode in self._rest(log, group).episodes]
                 self.gat.check(lengths, f"the trajectories without {self.by} {', '.join(map(str, group))}")
         after = [*groups[1:], groups[0]] if self.checks == "values" else [[]] * len(groups)
-        folds = [self._fold(log, *pair, console) for pair in zip(groups, after, strict=True)]
+        with console.plan("fold", [Part()] * len(groups)):
+            folds = [self._fold(log, *pair, console) for pair in zip(groups, after, strict=True)]
         documents.write_json(folder / DATA, [fold.document() for fold in folds])
         (folder / TABLE).write_text(table(folds, self.by), encoding="utf-8")
         means = {way: float(np.mean(np.concatenate([fold.replayed[way] for fold in folds]))) for way in folds[0].errors}
@@ -162,7 +164,7 @@ class CrossValidate:
     def _fold(self, log: Batch, values: list[Any], inner: list[Any], console: Console) -> Fold:
         """Diagnose the trajectories without some values, which know nothing of the others; these are looked at once."""
         title = f"{self.by} {', '.join(map(str, values))}"
-        console.status(f"{title} is held out")
+        console.begin(f"{title} held out")
         options = Options(
             self.without, self.most, self.duels, self.nulls, threads(self.workers), share_clock(log, self.clocks),
             seed=self.seed, tolerance=self.tolerance, held_out={self.by: inner} if inner else {},
@@ -174,7 +176,9 @@ class CrossValidate:
         after = findings.simulator.simulate(chosen.effects, chosen.fit.shifts, exp.pieces)
         causes = [chosen.names[cause.index] for cause in findings.verdict.causes]
         console.status(f"{title}: {' '.join([findings.verdict.word, *causes])}")
+        console.phase("replaying what was held out")
         errors, servos = self._errors(findings, _check(exp))
+        console.finish()
         return Fold(
             values=values,
             verdict=findings.verdict.word,

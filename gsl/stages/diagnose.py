@@ -80,12 +80,13 @@ class Diagnose:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json, report.html, the diagnosed world and the next experiment."""
+        console.phase("reading the log")
         log = read_logs(self.real)
         sim = with_logged_gains(self.sim, [episode.sensors for episode in log.episodes], self.real)
         if sim is not self.sim:
             console.status("note: the simulator's servos get the gains of the log")
             return replace(self, sim=sim).run(folder, console)
-        wiring = audit_log(log, self.sim, self.real) if self.audit else None
+        wiring = audit_log(log, self.sim, self.real, console) if self.audit else None
         if wiring and wiring.spoils:
             return write_wiring(wiring, folder, real=self.real, sim=self.sim.robot, command=self._command())
         measured = real_returns(self.policies, self.sim, trust=self.trust) if self.policies else None

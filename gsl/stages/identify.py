@@ -91,5 +91,5 @@ class Identify:
 def _gap(bench: Bench, effects: Effects) -> float:
     """Return the root mean square of the residuals [noise floors]."""
     z = bench.residual(effects, no_shifts(bench.joints))
-    used = bench.comparison.used(z.shape[1])
+    used = bench.comparison.count_residuals(z.shape[1])
     return float(np.sqrt((z**2).sum() / (used.sum() * len(z))))

@@ -145,7 +145,8 @@ class Import:
         which = "" if derived in (0, len(imported)) else f" in {derived} of {len(imported)} episodes"
         velocity = f"derived from positions{which}" if derived else "as logged"
         document = report(imported, files, period, chosen.mapping.turning)
-        warnings = [*document["warnings"], *list_unmatched(imported, self.mapping)]
+        remarks = dict.fromkeys(remark for episode in imported for remark in episode.remarks)
+        warnings = [*remarks, *document["warnings"], *list_unmatched(imported, self.mapping)]
         return {**document, "warnings": warnings, "notes": chosen.notes, "time": kept, "velocity": velocity}
 
     def _batch(self, imported: list[Episode], document: Mapping[str, Any], mapping: LogMapping) -> Batch:

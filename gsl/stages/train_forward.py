@@ -77,7 +77,7 @@ class TrainForward:
         newest = parts(path, other=SIM, share=self.heldout, seed=self.seed)
         earlier = {file: earlier_batch(file, newest.training) for file in map(data_file, self.earlier)}
         data = aggregate(newest, list(earlier.values()))
-        console.status(f"fitting a forward model to {len(data.training)} trajectories")
+        console.phase(f"fitting a forward model to {len(data.training)} trajectories")
         if data.training.states:
             if self.residual_to is not None:
                 raise ConfigError("residual_to", "is for robots; these trajectories are of an environment's states")

@@ -55,7 +55,7 @@ class TrainGrounding:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write what was learned, and the real trajectories that it was not learned from."""
-        console.status("the grounding learns")
+        console.phase("the grounding learns")
         real, count = None, 0
         if self.real is not None:
             newest = parts(data_file(self.real), other=SIM, share=self.heldout, seed=self.seed)

@@ -47,7 +47,7 @@ class TrainInverse:
             raise ConfigError("model.multi_step", "is of a forward model", given=str(self.model.multi_step))
         path = data_file(self.data)
         data = parts(path, other=REAL, share=self.heldout, seed=self.seed)
-        console.status(f"fitting an inverse model to {len(data.training)} trajectories")
+        console.phase(f"fitting an inverse model to {len(data.training)} trajectories")
         if data.training.states:
             return inverse_of_states(folder, data, self.model, self.seed)
         data = data.only(self.model.joints_of_interest(data.training.joints, "model"))

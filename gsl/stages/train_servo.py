@@ -81,11 +81,12 @@ class TrainServo:
             raise InputError(f"{self.real}: one window is held out; a servo needs two, to stop by and to check by")
         exp = exp.with_model_error(np.full(len(exp.joints), self.tolerance))
         walked = self._walks(exp)
-        console.status(f"learning the servo from {len(exp.records)} motions; a minute for a humanoid")
+        console.phase(f"learning the servo from {len(exp.records)} motions; a minute for a humanoid")
         learned = learn_servo(
             exp, self.sim.plant, self.sim.step, labelled=bool(self.held_out), seed=self.seed,
             threads=threads(self.workers), members=self.members, walks=walked,
         )  # fmt: skip
+        console.phase("measuring what the servo leaves unexplained")
         model = replace(learned.model, noise=self._measure_unexplained(exp, learned.model))
         further = [replace(servo.model, noise=model.noise) for servo in learned.further]
         write_model(folder, ServoMembers((model, *further)))

@@ -53,8 +53,8 @@ class Answered:
 
 def answer_files(folder: Path) -> list[Path]:
     """Return the files of an answer: in a request's folder, or in a folder of its own in it."""
-    found = (path for pattern in _PATTERNS for start in ("", "*/") for path in folder.glob(start + pattern))
-    return sorted(path for path in found if not path.relative_to(folder).parts[0].startswith("."))
+    matches = (path for pattern in _PATTERNS for start in ("", "*/") for path in folder.glob(start + pattern))
+    return sorted(path for path in matches if not path.relative_to(folder).parts[0].startswith("."))
 
 
 def read_answers(folder: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
@@ -64,18 +64,18 @@ def read_answers(folder: Path, request: Mapping[str, Any]) -> dict[str, Answered
         ArtifactError: A file answers another request, an episode twice, or not what was asked for.
         TrajectoryError: A log breaks the contract.
     """
-    found: dict[str, Answered] = {}
+    by_log: dict[str, Answered] = {}
     files = answer_files(folder)
     for path in (path for path in files if not path.name.startswith("returns")):
-        for name, one in read_log(path, request).items():
-            _once(found.get(name), path, name)
-            found[name] = one
-    told: dict[str, Answered] = {}
+        for name, answer in read_log(path, request).items():
+            _once(by_log.get(name), path, name)
+            by_log[name] = answer
+    by_return: dict[str, Answered] = {}
     for path in (path for path in files if path.name.startswith("returns")):
-        for name, one in read_returns(path, request).items():
-            _once(told.get(name), path, name)
-            told[name] = one
-    merged = {name: _merge(found.get(name), told.get(name)) for name in {**found, **told}}
+        for name, answer in read_returns(path, request).items():
+            _once(by_return.get(name), path, name)
+            by_return[name] = answer
+    merged = {name: _merge(by_log.get(name), by_return.get(name)) for name in {**by_log, **by_return}}
     check_lengths(folder, request, merged, set())
     return merged
 
@@ -85,12 +85,12 @@ def read_log(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     if path.suffix == ".parquet":
         batch = trajectories.read(path, joints=tuple(request["joints"]))
         check_marked(path, str(batch.metadata.get("request", "")), request)
-        labels = [str(one.get("name", "")) for one in batch.metadata.get("episodes", [])]
+        labels = [str(entry.get("name", "")) for entry in batch.metadata.get("episodes", [])]
         episodes = read_named(path, labels, batch.episodes, request)
     else:
         check_marked(path, read_mark(path), request)
         episodes = dict(csv_episodes(path, request))
-    return {name: _read_log(path, name, one, request) for name, one in episodes.items()}
+    return {name: _read_log(path, name, episode, request) for name, episode in episodes.items()}
 
 
 def read_named(
@@ -107,13 +107,13 @@ def read_named(
     return dict(zip(names, episodes, strict=True))
 
 
-def check_marked(path: Path, told: str, request: Mapping[str, Any]) -> None:
+def check_marked(path: Path, mark: str, request: Mapping[str, Any]) -> None:
     """Refuse what answers another request, or does not say which."""
-    if not told:
+    if not mark:
         advice = f"gsl answer request={path.parent.as_posix()} logs=... takes in what something else has logged"
         raise ArtifactError(path, f"does not say which request it answers; {advice}")
-    if told != request["hash"]:
-        raise ArtifactError(path, f"answers another request ({told[:12]}, not {request['hash'][:12]}); move it away")
+    if mark != request["hash"]:
+        raise ArtifactError(path, f"answers another request ({mark[:12]}, not {request['hash'][:12]}); move it away")
 
 
 def csv_episodes(path: Path, request: Mapping[str, Any]) -> Iterator[tuple[str, Trajectory]]:
@@ -137,18 +137,18 @@ def csv_episodes(path: Path, request: Mapping[str, Any]) -> Iterator[tuple[str, 
 
 def read_returns(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     """Return what a person measured: rows of `episode`, `distance` [m] or `value`, and `fell` (yes or no)."""
-    if told := read_mark(path):
-        check_marked(path, told, request)
-    found: dict[str, Answered] = {}
+    if mark := read_mark(path):
+        check_marked(path, mark, request)
+    answers: dict[str, Answered] = {}
     names, rows = table(path)
     if not {"episode", "fell"} <= set(names) or not {"distance", "value"} & set(names):
         needed = "needs the columns episode, distance (or value) and fell"
         raise ArtifactError(path, f"{needed}; it has {', '.join(names)[:80] or 'none'}")
     for number, row in enumerate(rows, start=1):
         name = _match(path, row["episode"].strip(), request)
-        _once(found.get(name), path, name)
-        found[name] = _read_measured(path, number, row)
-    return found
+        _once(answers.get(name), path, name)
+        answers[name] = _read_measured(path, number, row)
+    return answers
 
 
 def _read_measured(path: Path, number: int, row: Mapping[str, Any]) -> Answered:
@@ -169,13 +169,13 @@ def _read_measured(path: Path, number: int, row: Mapping[str, Any]) -> Answered:
     return Answered(path, fell=fell in YES, distance=numbers["distance"], value=numbers["value"])
 
 
-def _merge(log: Answered | None, told: Answered | None) -> Answered:
+def _merge(log: Answered | None, returned: Answered | None) -> Answered:
     """Return what log and measurement say together: who says that it fell is right."""
-    if log is None or told is None:
-        merged = log or told
+    if log is None or returned is None:
+        merged = log or returned
         assert merged is not None
         return merged
-    return replace(log, fell=log.fell or told.fell, distance=told.distance, value=told.value)
+    return replace(log, fell=log.fell or returned.fell, distance=returned.distance, value=returned.value)
 
 
 def check_rate(path: Path, name: str, episode: Trajectory, request: Mapping[str, Any]) -> None:
@@ -184,8 +184,8 @@ def check_rate(path: Path, name: str, episode: Trajectory, request: Mapping[str,
     wrong = np.abs(apart - period) > OFF * period
     if wrong.any():
         row = int(np.argmax(wrong)) + 1
-        told = f"row {row} comes {1e3 * apart[row - 1]:.3g} ms after the one before, not {1e3 * period:g} ms"
-        raise TrajectoryError(path, f"{name}: {told}; run it again at the rate that was asked for")
+        gap = f"row {row} comes {1e3 * apart[row - 1]:.3g} ms after the one before, not {1e3 * period:g} ms"
+        raise TrajectoryError(path, f"{name}: {gap}; run it again at the rate that was asked for")
 
 
 def _read_log(path: Path, name: str, episode: Trajectory, request: Mapping[str, Any]) -> Answered:
@@ -209,24 +209,24 @@ def _parts(request: Mapping[str, Any]) -> list[tuple[str, ...]]:
 
 
 def check_lengths(
-    path: Path, request: Mapping[str, Any], found: Mapping[str, Answered], fallen: Collection[str]
+    path: Path, request: Mapping[str, Any], answers: Mapping[str, Answered], fallen: Collection[str]
 ) -> None:
     """Refuse a log that is longer than what was asked for, or shorter without a fall.
 
     Args:
         path: Where the logs are from, as a person knows them.
         request: What was asked for.
-        found: The episodes by name.
+        answers: The episodes by name.
         fallen: Names of those that are known elsewhere to have ended in a fall.
     """
     for episode in request["episodes"]:
         name, steps = episode["name"], episode["steps"]
-        one = found.get(name)
-        if one is None or one.trajectory is None:
+        answer = answers.get(name)
+        if answer is None or answer.trajectory is None:
             continue
-        if (length := len(one.trajectory)) > steps:
+        if (length := len(answer.trajectory)) > steps:
             raise ArtifactError(path, f"{name}: has {length} steps, but {steps} were asked for; cut the rest off")
-        if length < steps and not (one.fell or one.stopped or name in fallen):
+        if length < steps and not (answer.fell or answer.stopped or name in fallen):
             problem = f"{name}: has {length} of {steps} steps and no fall; run it again, or say that it fell"
             raise ArtifactError(path, problem)
 
@@ -277,7 +277,7 @@ def _without_gaps(columns: dict[str, np.ndarray], request: Mapping[str, Any]) ->
         for name in Layout((), {part: size}, 1.0).columns[part]
     }
     gaps = {name for name in more - asked if name in columns and columns[name].dtype.kind == "f"}
-    return {name: one for name, one in columns.items() if name not in gaps or not np.isnan(one).any()}
+    return {name: column for name, column in columns.items() if name not in gaps or not np.isnan(column).any()}
 
 
 def _values(path: Path, name: str, column: Any) -> np.ndarray:

@@ -172,10 +172,10 @@ def collect_links() -> Iterator[Mapping[Path, Artifact]]:
 def _intact(folder: Path, key: str) -> Manifest | None:
     """Return the manifest of a folder that is the artifact of this key and as it was written."""
     try:
-        found = manifest.read(folder)
+        stored = manifest.read(folder)
     except ArtifactError:
         return None
-    return found if found.key == key and manifest.find_damage(folder, found) is None else None
+    return stored if stored.key == key and manifest.find_damage(folder, stored) is None else None
 
 
 def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force: bool, forced: str) -> Artifact | None:
@@ -183,23 +183,23 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
     if not out.exists() or (out.is_dir() and not any(out.iterdir())):
         return None
     try:
-        found = Artifact(out, manifest.read(out), unchanged=True)
+        artifact = Artifact(out, manifest.read(out), unchanged=True)
     except ArtifactError as error:
         if manifest.resembles(out):
             if force:
                 return None
             raise
         raise ArtifactError(out, "exists and is no artifact of gsl; move it away or choose another out=") from error
-    damaged, same = manifest.find_damage(out, found.manifest), found.manifest.key == identity.key
-    broken = None if damaged else broken_link(out, found.manifest)
+    damaged, same = manifest.find_damage(out, artifact.manifest), artifact.manifest.key == identity.key
+    broken = None if damaged else broken_link(out, artifact.manifest)
     if same and damaged is None and broken is None:
-        return found
+        return artifact
     if force:
         return None
     if damaged:
         problem = f"is damaged: {damaged} {manifest.describe_damage(out, damaged)}"
     elif not same:
-        problem = f"was built otherwise ({changes(found.manifest, found.config, identity, config)})"
+        problem = f"was built otherwise ({changes(artifact.manifest, artifact.config, identity, config)})"
     else:
         problem = f"is not whole any more: {broken}"
     raise ArtifactError(out, f"{problem}; force=true {forced}, another name= keeps both")
@@ -214,8 +214,8 @@ def _work(
     (folder / CONFIG).write_text(settings, encoding="utf-8")
     with log_to(folder) as logger:
         logger.info("%s begins: %s", identity.kind, command)
-        found = _sources(stage).items()
-        parents = tuple(Parent(role, relative(path, folder), identity.parents[role]) for role, path in found)
+        sources = _sources(stage).items()
+        parents = tuple(Parent(role, relative(path, folder), identity.parents[role]) for role, path in sources)
         listening = listen_to_steps(StepLog(folder, identity.kind).note)
         with collect_links() as links, at_work(Origin(command, settings, parents, folder, links)) as origin, listening:
             try:

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from gsl.errors import ConfigError
 
-RUNNER = "gsl.runner.main"
+RUNNER = "gsl.runner.process"
 _STAND_INS = {f"gsl.core.{name}": f"gsl.runner.stand_in.{name}" for name in ("setting", "compiled", "validation")}
 _STAND_INS["gsl"] = "gsl.runner.stand_in.face"
 _THERE = {*sys.stdlib_module_names, "numpy"}
@@ -23,12 +23,12 @@ def bundle(modules: tuple[str, ...]) -> dict[str, bytes]:
         ConfigError: One of them needs a library beside numpy.
     """
     files: dict[str, bytes] = {}
-    waiting, known = list(modules), set()
+    waiting, visited = list(modules), set()
     while waiting:
         name = waiting.pop()
-        if name in known:
+        if name in visited:
             continue
-        known.add(name)
+        visited.add(name)
         path = _source(_STAND_INS.get(name, name), modules[-1])
         below = "/__init__.py" if path.name == "__init__.py" or name == "gsl" else ".py"
         files[name.replace(".", "/") + below] = path.read_bytes()
@@ -67,7 +67,7 @@ def _is_module(name: str) -> bool:
 
 
 def _source(module: str, wanted: str) -> Path:
-    found = importlib.util.find_spec(module)
-    if found is None or found.origin is None or not found.origin.endswith(".py"):
+    spec = importlib.util.find_spec(module)
+    if spec is None or spec.origin is None or not spec.origin.endswith(".py"):
         raise ConfigError("policy", f"{wanted} needs {module}, which has no Python source to take along")
-    return Path(found.origin)
+    return Path(spec.origin)

@@ -101,6 +101,6 @@ def _episode(
         action = np.zeros(0)
     if action.ndim != 2 or action.shape[1] != len(order) or not len(action):
         raise ArtifactError(path, f"episode {name}: action must be rows of {len(order)} numbers, one a joint")
-    if (found := breach(bounds, action[:, order], period)) is not None:
-        raise ArtifactError(path, f"episode {name}, row {found.step}, {found.joint}: {found.problem}")
+    if (fault := breach(bounds, action[:, order], period)) is not None:
+        raise ArtifactError(path, f"episode {name}, row {fault.step}, {fault.joint}: {fault.problem}")
     return name, action[:, order]

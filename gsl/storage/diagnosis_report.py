@@ -23,8 +23,8 @@ def report_of(folder: Path) -> dict[str, Any]:
     report: dict[str, Any] = read_json(folder / REPORT)
     if not isinstance(report, dict):
         raise ValueError("a report holds entries by name")
-    found = {key: (folder / report[key]).as_posix() for key in ("world_file", "report") if report.get(key)}
+    files = {key: (folder / report[key]).as_posix() for key in ("world_file", "report") if report.get(key)}
     wanted = report.get("next_experiment")
     if wanted and wanted.get("file"):
-        found |= {"next_experiment": wanted | {"file": (folder / wanted["file"]).as_posix()}}
-    return report | found
+        files |= {"next_experiment": wanted | {"file": (folder / wanted["file"]).as_posix()}}
+    return report | files

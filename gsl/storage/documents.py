@@ -75,9 +75,9 @@ def read_versioned(path: Path, version: int, damaged: str) -> dict[str, Any]:
         raise ArtifactError(path, "does not exist") from error
     except (ValueError, OSError) as error:
         raise ArtifactError(path, damaged) from error
-    found = stored.get("schema_version") if isinstance(stored, dict) else None
-    if found != version:
-        raise ArtifactError(path, f"schema_version {found!r} is unknown; this gsl reads {version}")
+    stored_version = stored.get("schema_version") if isinstance(stored, dict) else None
+    if stored_version != version:
+        raise ArtifactError(path, f"schema_version {stored_version!r} is unknown; this gsl reads {version}")
     return dict(stored)
 
 

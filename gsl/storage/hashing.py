@@ -12,9 +12,10 @@ from gsl.core.budget import ARTIFACT_BYTES, check_file
 PACKAGE = Path(__file__).parents[1]
 SHORT = 12
 """Characters of a hash that are shown."""
+LOG = "log.txt"
 PAGE = "report.html"
 STEPS = "metrics.jsonl"
-CIRCUMSTANCES = ("manifest.json", "config.yaml", "log.txt", PAGE, STEPS)
+CIRCUMSTANCES = ("manifest.json", "config.yaml", LOG, PAGE, STEPS)
 
 
 def file_hash(path: Path) -> str:

@@ -80,17 +80,17 @@ def _list_made(name: str, below: Sequence[str]) -> bool:
     return name.rpartition(".")[2] in MADE and any(name.startswith(f"{part}.") for part in below)
 
 
-def without(told: Any, idle: Callable[[str, Any], bool]) -> Any:
+def without(part: Any, idle: Callable[[str, Any], bool]) -> Any:
     """Return components as plain data without their idle settings; plain mappings, as an environment's, keep theirs.
 
     Args:
-        told: Components, nested, each a mapping with a `_target_`.
+        part: Components, nested, each a mapping with a `_target_`.
         idle: Says of a component's setting, by name and value, whether it is left out.
     """
-    if isinstance(told, dict):
-        component = "_target_" in told
-        return {key: without(one, idle) for key, one in told.items() if not (component and idle(key, one))}
-    return [without(one, idle) for one in told] if isinstance(told, list) else told
+    if isinstance(part, dict):
+        component = "_target_" in part
+        return {key: without(value, idle) for key, value in part.items() if not (component and idle(key, value))}
+    return [without(entry, idle) for entry in part] if isinstance(part, list) else part
 
 
 def content_hash(path: Path) -> str:
@@ -101,9 +101,9 @@ def content_hash(path: Path) -> str:
     """
     if path.is_file():
         return file_hash(path)
-    found = manifest.read(path)
-    manifest.check_intact(path, found)
-    return found.contents
+    stored = manifest.read(path)
+    manifest.check_intact(path, stored)
+    return stored.contents
 
 
 def flat(value: Any, prefix: str = "") -> dict[str, Any]:

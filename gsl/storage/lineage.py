@@ -92,12 +92,12 @@ def broken_link(folder: Path, stored: Manifest) -> str | None:
     for link in stored.links:
         place = _place(folder, link)
         try:
-            found = manifest.read(place)
+            linked = manifest.read(place)
         except ArtifactError as error:
             return f"gone or damaged: {error.path.as_posix()}"
-        if damaged := manifest.find_damage(place, found):
+        if damaged := manifest.find_damage(place, linked):
             return f"changed since: {(place / damaged).as_posix()}"
-        if found.contents != link.hash:
+        if linked.contents != link.hash:
             return f"built anew since: {place.as_posix()}"
     return None
 

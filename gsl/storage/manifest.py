@@ -199,7 +199,7 @@ def _parse(stored: dict[str, Any]) -> Manifest:
     for name, kinds in _KINDS.items():
         if name in stored and not isinstance(stored[name], kinds):
             raise ValueError(f"{name} is of another kind")
-    texts = [text for one in (*parents, *links) for text in (one.role, one.path, one.hash)]
+    texts = [text for reference in (*parents, *links) for text in (reference.role, reference.path, reference.hash)]
     texts += [*trust, *(file.sha256 for file in files.values())]
     if not all(isinstance(text, str) and "\0" not in text for text in texts):
         raise ValueError("a part of it is no text")

@@ -41,8 +41,8 @@ def write_model(folder: Path, model: AnyForward | AnyInverse | ServoModel | Serv
 
 def model_file(reference: str, kind: str) -> Path:
     """Return the file of the model of a `kind` that a path, an artifact or a run's name stands for."""
-    found = resolve(reference, kind=MAKERS[kind])
-    return found / FILES[kind] if found.is_dir() else found
+    artifact = resolve(reference, kind=MAKERS[kind])
+    return artifact / FILES[kind] if artifact.is_dir() else artifact
 
 
 def read_forward_model(reference: str) -> AnyForward:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -10,10 +11,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from gsl.core.budget import DOCUMENT_BYTES, read_text
+from gsl.storage.hashing import LOG
 from gsl.storage.manifest import Parent
 
 if TYPE_CHECKING:
     from gsl.storage.artifact import Artifact
+
+_WARNING = re.compile(r" gsl: warning: (.*)")
 
 
 @dataclass(frozen=True)
@@ -38,9 +43,16 @@ class Origin:
     def links(self) -> tuple[Parent, ...]:
         """What has been built beside it, as its manifest names it."""
         return tuple(
-            Parent(one.manifest.kind, relative(path, self.folder), one.manifest.contents)
-            for path, one in sorted(self.built.items())
+            Parent(artifact.manifest.kind, relative(path, self.folder), artifact.manifest.contents)
+            for path, artifact in sorted(self.built.items())
         )
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What the console has warned of since the work began, and while what it built was made: the logs have it."""
+        logs = [self.folder / LOG, *(path / LOG for path in sorted(self.built))]
+        lines = [line for log in logs if log.is_file() for line in read_text(log, DOCUMENT_BYTES).splitlines()]
+        return tuple(dict.fromkeys(match[1] for line in lines if (match := _WARNING.search(line))))
 
 
 _at_work: ContextVar[Origin | None] = ContextVar("at_work", default=None)

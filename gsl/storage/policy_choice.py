@@ -40,10 +40,10 @@ class PolicyChoice:
         """
         if self.reference is None:
             return self.policy.initial
-        found = records(self.policy, self.reference)
-        if len(found) > 1:
-            raise ArtifactError(self.reference, f"holds {len(found)} policies; evaluate them and name that artifact")
-        return vector(self.policy, found[0])
+        stored = records(self.policy, self.reference)
+        if len(stored) > 1:
+            raise ArtifactError(self.reference, f"holds {len(stored)} policies; evaluate them and name that artifact")
+        return vector(self.policy, stored[0])
 
 
 def records(policy: Policy, reference: str) -> tuple[PolicyRecord, ...]:
@@ -53,12 +53,12 @@ def records(policy: Policy, reference: str) -> tuple[PolicyRecord, ...]:
         ArtifactError: if they are of another family.
     """
     path = resolve(reference)
-    found = read_policies(_file(path))
-    if found.policy != describe(policy):
-        raise ArtifactError(path, f"its policies are others: {_difference(found.policy, describe(policy))}")
-    for name in found.records[0].parameters.keys() ^ set(policy.names):
+    stored = read_policies(_file(path))
+    if stored.policy != describe(policy):
+        raise ArtifactError(path, f"its policies are others: {_difference(stored.policy, describe(policy))}")
+    for name in stored.records[0].parameters.keys() ^ set(policy.names):
         raise ArtifactError(path, f"parameter {name}: not both the file and the policy know it; choose another policy=")
-    return found.records
+    return stored.records
 
 
 def _file(path: Path) -> Path:
@@ -72,8 +72,8 @@ def _difference(theirs: Mapping[str, Any], ours: Mapping[str, Any]) -> str:
     """Return the first setting in which two policies differ."""
     left, right = flat(theirs), flat(ours)
     name = next(name for name in [*left, *right] if left.get(name) != right.get(name))
-    told = "their class" if name == "_target_" else name
-    return f"{told} is {left.get(name)}, but policy= here says {right.get(name)}"
+    what = "their class" if name == "_target_" else name
+    return f"{what} is {left.get(name)}, but policy= here says {right.get(name)}"
 
 
 def vector(policy: Policy, record: PolicyRecord) -> np.ndarray:
@@ -86,6 +86,6 @@ def record(policy: Policy, name: str, parameters: np.ndarray, **more: Any) -> Po
     return PolicyRecord(name, dict(zip(policy.names, parameters.tolist(), strict=True)), **more)
 
 
-def policies(policy: Policy, task: Any, found: list[PolicyRecord]) -> Policies:
+def policies(policy: Policy, task: Any, stored: list[PolicyRecord]) -> Policies:
     """Return what a policy file holds."""
-    return Policies(describe(policy), describe(task), tuple(found))
+    return Policies(describe(policy), describe(task), tuple(stored))

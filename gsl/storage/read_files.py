@@ -44,5 +44,5 @@ def _find(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
 
 def _sources(kind: type) -> list[Path]:
     """Return the files of a class and of what it derives from, gsl's own and Python's left out."""
-    found = [inspect.getsourcefile(one) for one in kind.__mro__ if is_own(one)]
-    return list(dict.fromkeys(Path(one) for one in found if one))
+    files = [inspect.getsourcefile(base) for base in kind.__mro__ if is_own(base)]
+    return list(dict.fromkeys(Path(file) for file in files if file))

@@ -44,19 +44,19 @@ def resolve(reference: str | Path, *, kind: str | tuple[str, ...] | None = None,
         return place
     if (place / manifest.NAME).is_file():
         manifest.read(place)
-    found = _artifacts(place)
-    own = [one for one in found if one.folder == place]
+    artifacts = _artifacts(place)
+    own = [artifact for artifact in artifacts if artifact.folder == place]
     if own and (kinds is None or own[0].manifest.kind in kinds):
         return place
-    fitting = [one for one in found if kinds is None or one.manifest.kind in kinds]
+    fitting = [artifact for artifact in artifacts if kinds is None or artifact.manifest.kind in kinds]
     if len(fitting) == 1:
         return fitting[0].folder
     if fitting:
-        choices = ", ".join(name_run(one.folder, runs) for one in fitting)
+        choices = ", ".join(name_run(artifact.folder, runs) for artifact in fitting)
         raise ArtifactError(reference, f"several artifacts fit, name one of them: {choices}")
     if own:
         raise ArtifactError(place, f"holds {own[0].manifest.kind}, but {wanted} is needed")
-    there = ", ".join(sorted({one.manifest.kind for one in found})) or "no complete artifact"
+    there = ", ".join(sorted({artifact.manifest.kind for artifact in artifacts})) or "no complete artifact"
     raise ArtifactError(place, f"holds {there}" + (f", but {wanted} is needed" if kind else "; build one in it first"))
 
 
@@ -76,7 +76,7 @@ def load(reference: str | Path, kind: str, *, runs: Path = RUNS) -> Artifact:
 
 def find_all(runs: Path = RUNS) -> list[Artifact]:
     """Return the complete artifacts below `runs`, oldest first."""
-    return sorted(_artifacts(runs), key=lambda one: (one.manifest.created, one.folder))
+    return sorted(_artifacts(runs), key=lambda artifact: (artifact.manifest.created, artifact.folder))
 
 
 def resolve_main(reference: str, *, kind: str | tuple[str, ...] | None = None) -> Path:
@@ -109,7 +109,7 @@ def artifact_folders(reference: str | None = None, *, runs: Path = RUNS) -> list
 
 def find_damaged(runs: Path = RUNS) -> list[Path]:
     """Return the folders below `runs` that were artifacts, but whose manifest cannot be read."""
-    return [folder for folder, found in _walk(runs) if found is None and manifest.resembles(folder)]
+    return [folder for folder, stored in _walk(runs) if stored is None and manifest.resembles(folder)]
 
 
 def _place(reference: str, runs: Path) -> Path:
@@ -126,19 +126,20 @@ def _place(reference: str, runs: Path) -> Path:
 
 def _alternatives(reference: str, runs: Path) -> str:
     run, _, stage = reference.rpartition("/")
-    inside = [name_run(one.folder, runs) for one in _artifacts(runs)]
+    inside = [name_run(artifact.folder, runs) for artifact in _artifacts(runs)]
     last = {name: name.rpartition("/")[2] for name in inside if run and name.startswith(f"{run}/")}
     if meant := difflib.get_close_matches(stage, sorted({*last.values()}), n=1, cutoff=ALIKE):
         deeper = [name for name in last if last[name] == meant[0]]
         return f", did you mean {' or '.join(deeper[:ALTERNATIVES])}?"
     maker = f"; gsl {MAKERS[stage]} name={run} makes it" if run and stage in MAKERS else ""
-    names = {path.name for path in runs.iterdir() if not path.name.startswith(".")} if runs.is_dir() else set()
+    there = runs.iterdir() if runs.is_dir() else ()
+    names = {path.name for path in there if path.exists() and not path.name.startswith(".")}
     close = difflib.get_close_matches(reference, sorted({*names, *inside}), n=1, cutoff=0.85 if maker else 0.6)
     return f", did you mean {close[0]}?" if close else maker
 
 
 def _artifacts(folder: Path) -> list[Artifact]:
-    return [Artifact(place, found) for place, found in _walk(folder) if found is not None]
+    return [Artifact(place, stored) for place, stored in _walk(folder) if stored is not None]
 
 
 def _walk(folder: Path) -> Iterator[tuple[Path, manifest.Manifest | None]]:

@@ -9,6 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from gsl.core.budget import is_plain
 from gsl.core.trust import modules_in
 from gsl.errors import ArtifactError
 from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of, read_stored
@@ -26,9 +27,9 @@ from pathlib import Path
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE / "modules"))
 
-from gsl.runner.main import main  # noqa: E402
+from gsl.runner.process import run  # noqa: E402
 
-sys.exit(main(HERE, sys.argv[1:]))
+run(HERE, sys.argv[1:])
 '''
 _TEMPLATE = '''"""Your robot: fill in read and send, or name another file of this kind with --robot."""
 
@@ -86,13 +87,13 @@ def write_request(folder: Path, request: Mapping[str, Any], warnings: Sequence[s
         ConfigError: The policy needs a library beside numpy.
         GslError: The folder cannot be written.
     """
-    if found := answer_files(folder):
+    if answers := answer_files(folder):
         if not (folder / NAME).exists():
             raise ArtifactError(
                 folder / NAME, "is missing beside an answer to it; put it back, or move the answer away"
             )
         read_stored(folder)
-        raise ArtifactError(found[0], "answers another request, which has changed since; move it away")
+        raise ArtifactError(answers[0], "answers another request, which has changed since; move it away")
     files = files_of(request)
     with explain_refusal(folder.parent):
         temporary = folder.with_name(f".{folder.name}.tmp-{os.getpid()}")
@@ -125,7 +126,7 @@ def _check_ours(folder: Path, new: Path) -> None:
         return
     for path in (path for path in sorted(new.rglob("*")) if path.is_file() and path.name != ROBOT):
         old = folder / path.relative_to(new)
-        if old.exists() and not (old.is_file() and old.read_bytes() == path.read_bytes()):
+        if old.exists() and not (is_plain(old) and old.read_bytes() == path.read_bytes()):
             raise ArtifactError(old, "is in the way of a request, and not gsl's; move it, or choose another folder")
 
 
@@ -174,6 +175,6 @@ def _readme(request: Mapping[str, Any], warnings: Sequence[str]) -> str:
         f"3. python runner.py{trust}                plays on the robot, asks before every movement, writes answer.csv",
         "4. bring answer.csv (and returns.csv) back into this folder and type the gsl command again",
         "",
-        *(["Beware:", *(f"- {one}" for one in warnings), ""] if warnings else []),
+        *(["Beware:", *(f"- {warning}" for warning in warnings), ""] if warnings else []),
     ]
     return "\n".join(lines)

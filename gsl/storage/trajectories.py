@@ -27,8 +27,8 @@ METADATA_KEY = b"gsl"
 
 def data_file(reference: str) -> Path:
     """Return the trajectory file that a path, an artifact of `collect` or `import`, or a run's name stands for."""
-    found = resolve(reference, kind=("collect", "import"))
-    return found / DATA if found.is_dir() else found
+    artifact = resolve(reference, kind=("collect", "import"))
+    return artifact / DATA if artifact.is_dir() else artifact
 
 
 def write(path: Path, batch: Batch) -> None:

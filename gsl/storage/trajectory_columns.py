@@ -32,7 +32,7 @@ def columns_of(path: Path, batch: Batch) -> dict[str, np.ndarray]:
     Raises:
         TrajectoryError: An array has another length or number of joints, or episodes have different columns.
     """
-    parts = [_episode_columns(path, batch, index, one) for index, one in enumerate(batch.episodes)]
+    parts = [_episode_columns(path, batch, index, episode) for index, episode in enumerate(batch.episodes)]
     for index, part in enumerate(parts):
         if part.keys() != parts[0].keys():
             different = sorted(part.keys() ^ parts[0].keys())
@@ -40,25 +40,25 @@ def columns_of(path: Path, batch: Batch) -> dict[str, np.ndarray]:
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-def _episode_columns(path: Path, batch: Batch, index: int, one: Trajectory) -> dict[str, np.ndarray]:
-    rows = len(one) + 1
+def _episode_columns(path: Path, batch: Batch, index: int, episode: Trajectory) -> dict[str, np.ndarray]:
+    rows = len(episode) + 1
     columns: dict[str, np.ndarray] = {
         "episode": np.full(rows, index, dtype=np.int32),
         "step": np.arange(rows, dtype=np.int32),
-        "time": one.time,
+        "time": episode.time,
     }
     for group in OF_ACTIONS if batch.states else ARRAYS:
-        if (values := getattr(one, group)) is not None:
+        if (values := getattr(episode, group)) is not None:
             if np.ndim(values) != 2 or values.shape[1] != len(batch.joints):
                 problem = f"episode {index}: shape {np.shape(values)} for {len(batch.joints)} joints"
                 raise TrajectoryError(path, problem, column=group)
             columns.update(zip(joint_columns(group, batch.joints), np.asarray(values).T, strict=True))
-    if one.state is not None:
-        now, then = one.state.T, one.state[1:].T
+    if episode.state is not None:
+        now, then = episode.state.T, episode.state[1:].T
         columns.update(zip(state_columns("state", batch.states), now, strict=True))
         columns.update(zip(state_columns("next_state", batch.states), then, strict=True))
-    columns.update({name: one.sensors[name] for name in sorted(one.sensors)})
-    columns.update({name: getattr(one, name) for name in ("reward", "fell") if getattr(one, name) is not None})
+    columns.update({name: episode.sensors[name] for name in sorted(episode.sensors)})
+    columns.update({name: getattr(episode, name) for name in ("reward", "fell") if getattr(episode, name) is not None})
     return {name: _column(path, index, name, values, rows) for name, values in columns.items()}
 
 
@@ -76,8 +76,8 @@ def _column(path: Path, index: int, name: str, values: np.ndarray, rows: int) ->
 def metadata_of(batch: Batch, columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """Return what the file says of itself: the batch's metadata, joints, control period [s] and units."""
     groups = {*columns, *(name.partition(".")[0] for name in columns), *(name.rpartition(".")[0] for name in columns)}
-    known = {"time": UNITS["time"]} if batch.states else UNITS
-    units = {**batch.metadata.get("units", {}), **{group: unit for group, unit in known.items() if group in groups}}
+    usual = {"time": UNITS["time"]} if batch.states else UNITS
+    units = {**batch.metadata.get("units", {}), **{group: unit for group, unit in usual.items() if group in groups}}
     return {
         **dict.fromkeys(("source", "seed", "world", "policy")),
         **batch.metadata,

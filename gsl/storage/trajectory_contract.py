@@ -107,8 +107,8 @@ def check_metadata(path: Path, metadata: Any, robot_joints: tuple[str, ...] | No
     if not isinstance(metadata, Mapping) or "schema_version" not in metadata:
         raise TrajectoryError(path, "the metadata key `gsl` holds no schema_version; write the file with gsl")
     if metadata["schema_version"] != SCHEMA_VERSION:
-        found = metadata["schema_version"]
-        raise TrajectoryError(path, f"schema_version {found!r} is unknown; this gsl reads {SCHEMA_VERSION}")
+        version = metadata["schema_version"]
+        raise TrajectoryError(path, f"schema_version {version!r} is unknown; this gsl reads {SCHEMA_VERSION}")
     if missing := [key for key in REQUIRED_KEYS if metadata.get(key) is None]:
         raise TrajectoryError(path, f"the metadata lack {', '.join(missing)}; add them under the key `gsl`")
     if metadata["role"] not in ROLES:
@@ -165,15 +165,15 @@ def check_names(path: Path, names: list[str], metadata: Mapping[str, Any]) -> No
     for name in required:
         if name not in there:
             raise TrajectoryError(path, f"is missing{suggestion(name, there - set(required))}", column=name)
-    known = {*required, "reward"}
+    columns = {*required, "reward"}
     if states:
-        known.add("terminated")
+        columns.add("terminated")
     else:
-        known.update((*SENSORS, "fell", *(name for group in JOINT_SENSORS for name in joint_columns(group, joints))))
+        columns.update((*SENSORS, "fell", *(name for group in JOINT_SENSORS for name in joint_columns(group, joints))))
     for name in names:
         declared = (name in own or name.rpartition(".")[0] in own) and not name.startswith("next_state.")
-        if name not in known and not declared:
-            advice = f"is unknown{suggestion(name, known)}; a column of your own needs a unit under `units`"
+        if name not in columns and not declared:
+            advice = f"is unknown{suggestion(name, columns)}; a column of your own needs a unit under `units`"
             raise TrajectoryError(path, advice, column=name)
 
 

@@ -121,13 +121,13 @@ def remove_temporary(folder: Path) -> None:
         path.unlink()
 
 
-def exchange(one: Path, other: Path) -> bool:
+def exchange(first: Path, other: Path) -> bool:
     """Let two folders swap their names in one step; False where the system cannot (not Linux, or NFS)."""
     try:
         rename = ctypes.CDLL(None, use_errno=True).renameat2
     except AttributeError:
         return False
-    return bool(rename(_HERE, os.fsencode(one), _HERE, os.fsencode(other), _EXCHANGE) == 0)
+    return bool(rename(_HERE, os.fsencode(first), _HERE, os.fsencode(other), _EXCHANGE) == 0)
 
 
 def flush(path: Path) -> None:

@@ -14,12 +14,12 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
+from gsl.core.budget import is_plain
 from gsl.errors import ArtifactError
-from gsl.storage.hashing import STEPS
+from gsl.storage.hashing import LOG, STEPS
 from gsl.storage.whole import claim, exchange, explain_refusal, flush, remove_temporary
 
 KEY = ".key"
-LOG = "log.txt"
 
 
 @contextmanager
@@ -83,7 +83,7 @@ def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ())
     """
     folder = _partial(out) if progress else out.with_name(f".{out.name}.tmp-{os.getpid()}")
     with explain_refusal(out.parent):
-        if folder.exists() and not ((folder / KEY).is_file() and (folder / KEY).read_bytes() == key.encode()):
+        if folder.exists() and not (is_plain(folder / KEY) and (folder / KEY).read_bytes() == key.encode()):
             shutil.rmtree(folder)
         folder.mkdir(exist_ok=True)
         _clear(folder, {progress, KEY, LOG, STEPS, *kept})

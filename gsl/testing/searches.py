@@ -30,11 +30,11 @@ def check_search(search: Search, *, parameters: int = PARAMETERS) -> None:
         promise = f"asked for {len(generation)} candidates and not for the {search.candidates} of its settings"
         require(search, len(generation) == search.candidates, promise)
     again, other = _run(search, parameters, SEED, _value), _run(search, parameters, SEED + 1, _value)
-    require(search, np.array_equal(first, again), "asks for other candidates when it is told the same values again")
+    require(search, np.array_equal(first, again), "asks for other candidates for the same values again")
     require(search, not np.array_equal(first, other), "does not depend on its seed")
     if len(first) > 1:
         worst = _run(search, parameters, SEED, lambda candidate: -_value(candidate))
-        require(search, not np.array_equal(first, worst), "does not depend on the values that it is told")
+        require(search, not np.array_equal(first, worst), "does not depend on the values that it gets")
 
 
 def _value(candidate: np.ndarray) -> float:

@@ -65,14 +65,14 @@ def _side_by_side(
         side_by_side(zeros_in_lanes(1, 1))[0], np.array([0, 1]),
         side_by_side(zeros_in_lanes(LAYERS, HIDDEN)),
     )  # fmt: skip
-    told, slopes, sums = cube(periods, 2, n), zeros_in_lanes(periods, m), sums_in_lanes(n, len(to.last_bias))
+    measured, slopes, sums = cube(periods, 2, n), zeros_in_lanes(periods, m), sums_in_lanes(n, len(to.last_bias))
     path = Path(
         state, side_by_side(loaded.clock)[0], side_by_side(loaded.mobility), side_by_side(loaded.free),
         side_by_side(cube(steps + 1, 2, n)), side_by_side(cube(steps, MEMORY, n)), side_by_side(cube(steps, ROWS, n)),
-        side_by_side(told),
+        side_by_side(measured),
     )  # fmt: skip
     replay(servos, path, side_by_side(loaded.motion), step, substeps)
-    cost = score(data, some, robust, told, slopes)
+    cost = score(data, some, robust, measured, slopes)
     by = Gradient(
         side_by_side(sums.numbers), side_by_side(sums.lag), side_by_side(sums.first), side_by_side(sums.first_bias),
         side_by_side(sums.second), side_by_side(sums.second_bias), side_by_side(sums.last),
@@ -90,7 +90,7 @@ def _back(servos: ServoParameters, path: Path, slopes: np.ndarray, step: float, 
     Args:
         servos: With the law; numbers are changed in between.
         path: Of the replay.
-        slopes: Derivatives of the cost by the told positions [1/rad], shape (T, m).
+        slopes: Derivatives of the cost by the measured positions [1/rad], shape (T, m).
         step: Physics period [s].
         substeps: Physics steps in a control period.
         to: Derivatives, in lanes.

@@ -45,7 +45,7 @@ class Path(NamedTuple):
         memory: Of the servos before each physics step, shape (S, MEMORY, n).
         seen: Control error [rad], position [rad] and velocity [rad/s] as the servo saw them, wanted torque and what the
             law adds at the output [N·m], in each physics step, shape (S, ROWS, n).
-        told: Positions [rad] and velocities [rad/s] that the encoders tell after each period, shape (T, 2, n).
+        encoders: Positions [rad] and velocities [rad/s] that the encoders tell after each period, shape (T, 2, n).
     """
 
     state: ServoState
@@ -55,7 +55,7 @@ class Path(NamedTuple):
     motion: np.ndarray
     memory: np.ndarray
     seen: np.ndarray
-    told: np.ndarray
+    encoders: np.ndarray
 
 
 class Moment(NamedTuple):
@@ -130,7 +130,7 @@ def replay(servos: ServoParameters, path: Path, start: np.ndarray, step: float, 
             now = Moment(s, k * step, step, period, motion, after, memory, seen)
             _torque(servos, state, now, torque)
             _move(path.mobility[t], path.free[t], torque, now)
-        encoder_motion(servos, state, path.motion[(t + 1) * substeps], step, path.told[t])
+        encoder_motion(servos, state, path.motion[(t + 1) * substeps], step, path.encoders[t])
         state.clock[0] += period
 
 
@@ -165,22 +165,22 @@ def _move(mobility: np.ndarray, free: np.ndarray, torque: np.ndarray, now: Momen
 
 
 @compile_kernel
-def score(data: Frozen, some: np.ndarray, robust: float, told: np.ndarray, slopes: np.ndarray) -> float:
+def score(data: Frozen, some: np.ndarray, robust: float, measured: np.ndarray, slopes: np.ndarray) -> float:
     """Return the cost of replayed windows.
 
     Args:
         data: The windows.
         some: Indices of those that were replayed, at most LANES.
         robust: Residual beyond which one counts less and less (Cauchy) [floors].
-        told: Of `Path`, as floats, shape (T, 2, n, LANES).
-        slopes: Result, derivatives by the told positions [1/rad], shape (T, m, LANES); zero where a replay is lost.
+        measured: Of `Path`, as floats, shape (T, 2, n, LANES).
+        slopes: Result, derivatives by the measured positions [1/rad], shape (T, m, LANES); zero where a replay is lost.
     """
     cost = 0.0
     for lane in range(LANES):
         w = some[min(lane, len(some) - 1)]
         for t in range(data.warm_up, len(slopes)):
             for i in range(slopes.shape[1]):
-                z = (told[t, 0, i, lane] + data.bias[i] - data.real[w, t, i]) / data.floor[i]
+                z = (measured[t, 0, i, lane] + data.bias[i] - data.real[w, t, i]) / data.floor[i]
                 lost = not abs(z) < LOST
                 z = LOST if lost else z
                 if lane < len(some):

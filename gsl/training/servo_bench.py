@@ -112,7 +112,7 @@ class ServoBench:
     def by_group(self, index: np.ndarray, model: ServoModel) -> dict[str, float]:
         """Return the root mean square of residuals by group, and of `all` [floors]."""
         z = self.residuals(index, model)
-        return levels(z, self.exp.comparison.used(z.shape[1]), self.group, model.groups)
+        return levels(z, self.exp.comparison.count_residuals(z.shape[1]), self.group, model.groups)
 
     @property
     def group(self) -> np.ndarray:

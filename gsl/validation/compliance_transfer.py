@@ -165,7 +165,7 @@ def report_compliance(
     nothing = isinstance(grounding, NoGrounding | ActionNoise) and world == plain
     if nothing or not (isinstance(plain, BulletWorld) and isinstance(world, BulletWorld)) or plain.motors != "servo":
         return {}  # the engine's own motors bear any load below their limit
-    console.status("loading single joints in the air, without and with the grounding")
+    console.phase("loading single joints in the air, without and with the grounding")
     start = derive_seed(seed, SECTION)
     transfer = ComplianceReport(measure(plain, NoGrounding(), start), measure(world, grounding, start))
     before = json.loads(report.read_text(encoding="utf-8")) if report.exists() else {}

@@ -29,7 +29,7 @@ FIGURE = "grounding.png"
 @examine.register
 def check_transformation(grounding: ActionTransformation, scenario: Scenario, gate: Gate) -> Passed:
     """Load models, settle alpha, and compare with held-out real trajectories."""
-    gate.console.status("checking the grounded simulator against held-out real trajectories")
+    gate.console.phase("checking the grounded simulator against held-out real trajectories")
     loaded = grounding.load(read_forward_model, read_inverse_model)
     folder = model_file(grounding.forward_model, "forward_model").parent
     heldout = read(folder / HELDOUT)

@@ -138,7 +138,8 @@ def _caveats(gap: Mapping[str, Any], stopped: int, rest: Mapping[str, Any] | Non
         stops = "1 policy was" if stopped == 1 else f"{stopped} policies were"
         without = f" {_without(gap, rest)}" if rest else ""
         said.append(
-            f"{stops} stopped at the first fall in real: the real return is rough there, with no interval.{without}"
+            f"{stops} stopped at the first fall on the real side: "
+            f"the real return is rough there, with no interval.{without}"
         )
     return said
 

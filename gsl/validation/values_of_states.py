@@ -35,7 +35,8 @@ class ValueReport:
             return ()
         values = {name: Unit().bare(self.values[name].mean()) for name in self.values}
         return (
-            f"π0 is worth {values['grounded']}, {values['ungrounded']} without grounding, {values['real']} in real",
+            f"π0 is worth {values['grounded']}, {values['ungrounded']} without grounding, "
+            f"{values['real']} on the real side",
         )
 
     @property
@@ -45,20 +46,20 @@ class ValueReport:
         if count < 2:
             return "one held-out real episode is no measure: nothing is known of this grounding"
         if self.problems:
-            return "with the grounding π0 is surely farther from what it is worth in real"
+            return "with the grounding π0 is significantly farther from what it is worth on the real side"
         if self._surely_nearer("grounded", "ungrounded"):
-            return f"with the grounding π0 is surely nearer to what it is worth in real{self._remainder}"
-        sentence = (
-            f"π0's {count} held-out real episodes do not tell whether this grounding is nearer to real{self._remainder}"
-        )
-        return f"{sentence}: the search goes on with it"
+            return (
+                f"with the grounding π0 is significantly nearer to what it is worth on the real side{self._remainder}"
+            )
+        unclear = f"π0's {count} held-out real episodes do not show whether this grounding is nearer to the real side"
+        return f"{unclear}{self._remainder}: the search goes on with it"
 
     @property
     def _remainder(self) -> str:
         """What the grounding leaves of the gap, as far as that is sure; a search makes use of it."""
         left = self._apart("grounded")
         if left.lower > 0.0 or left.upper < 0.0:
-            return f", and π0 is still surely worth {'more' if left.lower > 0.0 else 'less'} in it"
+            return f", and π0 is still significantly worth {'more' if left.lower > 0.0 else 'less'} in it"
         return ""
 
     def _apart(self, name: str) -> Interval:

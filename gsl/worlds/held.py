@@ -106,11 +106,11 @@ class Held:
             windows: To replay.
             load: What the motors bear besides their servos [N·m], shape (T · substeps, n_motors), in every window.
         """
-        told = np.full((len(windows.clock), windows.length, len(self.bias)), np.nan)
+        measured = np.full((len(windows.clock), windows.length, len(self.bias)), np.nan)
         load = np.zeros((0, len(self.bias))) if load is None else load
         substeps = round(self.period / self.step)
-        _replay(self.servo, self.tree, self.pushes, load, windows, self.step, substeps, self.accurate, told)
-        return told + self.bias
+        _replay(self.servo, self.tree, self.pushes, load, windows, self.step, substeps, self.accurate, measured)
+        return measured + self.bias
 
     def play(self, paths: Sequence[np.ndarray], starts: Sequence[np.ndarray], settle: int) -> list[np.ndarray]:
         """Return what the encoders tell before each command and after the last one [rad], (T + 1, n_motors) each.
@@ -124,8 +124,8 @@ class Held:
         commands = np.array([_around(path, COMMANDS - 1 + settle, longest - len(path))[::-1] for path in paths])
         motion = np.stack([starts, np.zeros_like(starts)], axis=1)
         clock = np.full(len(paths), -settle * self.period)
-        told = self.replay(Windows(np.ascontiguousarray(commands), motion, clock))
-        return [one[settle - 1 : settle + len(path)] for one, path in zip(told, paths, strict=True)]
+        measured = self.replay(Windows(np.ascontiguousarray(commands), motion, clock))
+        return [replay[settle - 1 : settle + len(path)] for replay, path in zip(measured, paths, strict=True)]
 
 
 def refuse_hook(plant: Plant) -> None:
@@ -161,19 +161,19 @@ def _aim(push: Push, robot: Robot) -> list[tuple[float, ...]]:
 @compile_kernel
 def _replay(
     servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, step: float,
-    substeps: int, accurate: bool, told: np.ndarray,
+    substeps: int, accurate: bool, measured: np.ndarray,
 ) -> None:  # fmt: skip
-    for first in range(0, told.shape[0], LANES):
-        _side_by_side(servo, tree, pushes, load, windows, first, step, substeps, accurate, told)
+    for first in range(0, measured.shape[0], LANES):
+        _side_by_side(servo, tree, pushes, load, windows, first, step, substeps, accurate, measured)
 
 
 @compile_kernel
 def _side_by_side(
     servo: ServoParameters, tree: Chain, pushes: np.ndarray, load: np.ndarray, windows: Windows, first: int,
-    step: float, substeps: int, accurate: bool, told: np.ndarray,
+    step: float, substeps: int, accurate: bool, measured: np.ndarray,
 ) -> None:  # fmt: skip
     """Replay as many windows as there are lanes, from the first one on."""
-    periods, n = told.shape[1], told.shape[2]
+    periods, n = measured.shape[1], measured.shape[2]
     numbers, speaking = zeros_in_lanes(2, n), zeros_in_lanes(2, n)
     motion, encoders = side_by_side(numbers), side_by_side(speaking)
     asked, since = zeros_in_lanes(periods + COMMANDS - 1, windows.commands.shape[2]), zeros_in_lanes(1, 1)
@@ -196,7 +196,7 @@ def _side_by_side(
         else:
             _step(servo, state, tree, pushes, row, motion, step, substeps, scratch)
         encoder_motion(servo, state, motion, step, encoders)
-        if not _note(numbers[1], speaking[0], told[first : first + LANES], t):
+        if not _note(numbers[1], speaking[0], measured[first : first + LANES], t):
             break
         state.clock[0] += substeps * step
 
@@ -282,10 +282,10 @@ def _push(pushes: np.ndarray, time: float, step: float, force: np.ndarray) -> No
 
 
 @compile_kernel
-def _note(speeds: np.ndarray, position: np.ndarray, told: np.ndarray, t: int) -> bool:
+def _note(speeds: np.ndarray, position: np.ndarray, measured: np.ndarray, t: int) -> bool:
     """Write down the positions of replays that have not run away, now or before, and tell whether there are any."""
     some = False
-    for lane in range(len(told)):
-        if (t == 0 or not np.isnan(told[lane, t - 1, 0])) and np.all(np.abs(speeds[:, lane]) < RUNAWAY):
-            told[lane, t], some = position[:, lane], True
+    for lane in range(len(measured)):
+        if (t == 0 or not np.isnan(measured[lane, t - 1, 0])) and np.all(np.abs(speeds[:, lane]) < RUNAWAY):
+            measured[lane, t], some = position[:, lane], True
     return some

@@ -175,16 +175,16 @@ def _evaluate_law(
 
 @compile_inner
 def encoder_motion(
-    servos: ServoParameters, state: ServoState, motion: np.ndarray, step: float, told: np.ndarray
+    servos: ServoParameters, state: ServoState, motion: np.ndarray, step: float, measured: np.ndarray
 ) -> None:
-    """Fill `told` with what the encoders tell between two physics steps, given the outputs', both (2, n_motors)."""
+    """Fill `measured` with what the encoders tell between two physics steps, given the outputs', both (2, n_motors)."""
     parameters = servos.rows
     for i in range(motion.shape[1]):
-        told[0, i], told[1, i] = _measure(parameters, state.memory, i, motion)
+        measured[0, i], measured[1, i] = _measure(parameters, state.memory, i, motion)
         if parameters[ROW.sensor_delay, i] > 0.0:
             for row in range(2):
-                now, delay = told[row, i], parameters[ROW.sensor_delay, i]
-                told[row, i] = read_encoder(delay, state.history, state.steps[0], now, row, i, step)
+                now, delay = measured[row, i], parameters[ROW.sensor_delay, i]
+                measured[row, i] = read_encoder(delay, state.history, state.steps[0], now, row, i, step)
 
 
 @compile_inner

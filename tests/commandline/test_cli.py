@@ -1,5 +1,6 @@
 """The command line as a process: light to start, and it leaves cleanly."""
 
+import json
 import os
 import signal
 import subprocess
@@ -108,3 +109,36 @@ def test_jobs_run_side_by_side_with_another_launcher(tmp_path: Path) -> None:
     done = gsl("collect", "-m", "seed=1,2", "hydra/launcher=joblib", "hydra.launcher.n_jobs=2", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert sorted(path.name for path in (tmp_path / "runs/example").iterdir()) == ["seed=1", "seed=2"]
+
+
+def test_what_an_environment_prints_stays_out_of_the_document(tmp_path: Path) -> None:
+    (tmp_path / "chatty.py").write_text(
+        "import os\n"
+        "from gymnasium.envs.classic_control import PendulumEnv\n\n"
+        "class Chatty(PendulumEnv):\n"
+        "    def reset(self, **more):\n"
+        "        self.rows = 0\n"
+        "        return super().reset(**more)\n\n"
+        "    def step(self, action):\n"
+        "        print('a step')\n"
+        "        os.write(1, b'and one of C\\n')\n"
+        "        self.rows += 1\n"
+        "        observation, reward, _, _, about = super().step(action)\n"
+        "        return observation, reward, False, self.rows >= 20, about\n"
+    )
+    environment = {name: value for name, value in ENVIRONMENT.items() if not name.startswith("GSL_")}
+    words = (
+        *("collect", "world=gymnasium", "world.env_id=chatty:Chatty", "trust=chatty", "task=own_reward", "policy=mlp"),
+        *("policy.hidden=[]", "episodes=1", "neighbours=0", "workers=1", "name=x", "--json"),
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "gsl", *words],
+        cwd=tmp_path,
+        env=environment,
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["metrics"]["episodes"] == 1
+    assert "a step" in done.stderr and "and one of C" in done.stderr

@@ -99,7 +99,7 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
         (["episodes"], "episodes: has no value; write key=value"),
         (["episodes=[1"], "episodes = [1: cannot be read"),
         (["episodes=1,2"], "episodes: several values need --multirun; a list is written 'episodes=[1,2]'"),
-        (["episodes=${nope}"], "episodes: Interpolation key 'nope' not found"),
+        (["episodes=${nope}"], "episodes: refers to nope, and this command has no such setting"),
         (["force=maybe"], "force = maybe: must be true or false"),
         (["name="], "name: must not be empty"),
         (["world=plain"], "world.effects.mine.width = -1: must be at least 0 (rad)"),
@@ -163,6 +163,12 @@ def test_a_stage_that_fails_leaves_nothing_behind(
 def test_a_fault_of_gsls_is_an_internal_error() -> None:
     line = "internal error: ZeroDivisionError: division by zero in two lines; GSL_TRACEBACK=1 shows where"
     assert describe_failure(ZeroDivisionError("division by zero\nin two lines")) == (line, 1)
+
+
+@pytest.mark.parametrize("failure", [MemoryError("Unable to allocate 7 TiB"), OSError(12, "Cannot allocate memory")])
+def test_a_lack_of_memory_is_one_line(failure: Exception) -> None:
+    line = "there is not enough memory for this; free some, or try workers=1, or less at once"
+    assert describe_failure(failure) == (line, 1)
 
 
 def test_a_traceback_is_there_for_who_asks(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -279,9 +285,9 @@ def _choices() -> Iterator[tuple[str, ...]]:
             for entry in defaults
             if isinstance(entry, dict) and not next(iter(entry)).startswith("override")
         ]
-        found = [typed for typed in _shares(groups, conf, command.stem) if typed]
-        for number in range(max(map(len, found), default=0)):
-            chosen = [typed[min(number, len(typed) - 1)] for typed in found]
+        shares = [typed for typed in _shares(groups, conf, command.stem) if typed]
+        for number in range(max(map(len, shares), default=0)):
+            chosen = [typed[min(number, len(typed) - 1)] for typed in shares]
             pairs = {re.sub(r"[.].*=", "=", word) for word in chosen}  # worlds.nao_worn=nao_weak: one of worlds
             if number == 0 or not pairs <= seen:
                 yield command.stem.replace("_", "-"), *chosen, *NEEDED.get(command.stem, ())
@@ -303,9 +309,11 @@ def _choices() -> Iterator[tuple[str, ...]]:
         yield command.split()[0], f"{command.split()[1]}=robot"
     for world in HELD:
         mine = (f"robot={EXAMPLE}",) if world == "urdf" else ()
-        yield "collect", f"world={world}", *(f"world.{one}" for one in mine), "task=excite"
-        yield "diagnose", f"sim={world}", *(f"sim.{one}" for one in mine), "real=logs"
-    others = (one for one in sorted((conf / "world").glob("[!n]*.yaml")) if one.stem not in (*HELD, "robot", "learned"))
+        yield "collect", f"world={world}", *(f"world.{setting}" for setting in mine), "task=excite"
+        yield "diagnose", f"sim={world}", *(f"sim.{setting}" for setting in mine), "real=logs"
+    others = (
+        path for path in sorted((conf / "world").glob("[!n]*.yaml")) if path.stem not in (*HELD, "robot", "learned")
+    )
     for world in others:
         place = ("world.env_id=examples.cart:Cart",) if world.stem == "gymnasium" else ()
         policy = "action_table" if world.stem.startswith("cliff") else "mlp"
@@ -323,14 +331,14 @@ def _shares(groups: list[str], conf: Path, command: str) -> Iterator[list[str]]:
 
 def _typed(group: str, conf: Path, command: str) -> list[str]:
     folder, _, role = group.partition("@")
-    found = (option.stem for option in sorted((conf / folder).glob("*.yaml")))
+    options = (option.stem for option in sorted((conf / folder).glob("*.yaml")))
     if role.endswith("excitation"):  # the policy that a diagnosis plays
         return [f"{role}=excitation"]
     if command in ("reproduce_fig11", "reproduce_fig12", "reproduce_fig13", "reproduce_garat"):
         return [f"{folder}={name}" for name in ("toy", "study")] if folder == "preset" else []
     if command in REPLAYING:
-        found = (name for name in found if not name.startswith("nao_motors"))
-    mine = (name for name in found if name not in OF_ENVIRONMENTS.get(folder, ()))
+        options = (name for name in options if not name.startswith("nao_motors"))
+    mine = (name for name in options if name not in OF_ENVIRONMENTS.get(folder, ()))
     robots = (name for name in mine if folder != "world" or name.startswith("nao"))
     return [f"{role or folder}={name}" for name in robots if name != "excite" or command == "collect"]
 

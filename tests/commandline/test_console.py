@@ -159,12 +159,46 @@ def test_progress_without_a_terminal_is_a_line_every_ten_seconds_at_most(
                     progress.advance()
             console.finish()
     assert capsys.readouterr().err.splitlines() == [
-        "17 % done, 50 s left; stage 1 of 2 (collect), walking: 20 of 60, 2.0 a second",
-        "33 % done, 40 s left; stage 1 of 2 (collect), walking: 40 of 60, 2.0 a second",
-        "50 % done, 30 s left; stage 1 of 2 (collect), walking: 60 of 60, 2.0 a second",
-        "83 % done, 8 s left; stage 2 of 2 (optimize), walking: 20 of 30, 2.0 a second",
+        "17 % done, about 50 s left; stage 1 of 2 (collect), walking: 20 of 60, 2.0 a second",
+        "33 % done, about 40 s left; stage 1 of 2 (collect), walking: 40 of 60, 2.0 a second",
+        "50 % done, about 30 s left; stage 1 of 2 (collect), walking: 60 of 60, 2.0 a second",
+        "83 % done, about 8 s left; stage 2 of 2 (optimize), walking: 20 of 30, 2.0 a second",
     ]
     assert caplog.messages == []  # nothing of it enters the log of an artifact
+
+
+def test_work_that_says_nothing_shows_its_stage_within_two_seconds(capsys: pytest.CaptureFixture[str]) -> None:
+    console = Console()
+    with console.at_work("diagnose"):
+        console.phase("looking at the wiring")
+        time.sleep(2.0)
+        said = capsys.readouterr()
+    assert said == ("", "looking at the wiring, 1 s\n")
+    with console.at_work("diagnose"):
+        pass
+    assert capsys.readouterr() == ("", "")  # what is done soon says nothing
+
+
+def test_work_that_says_nothing_is_silent_where_that_was_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["-q", "--version"]) == 0
+    capsys.readouterr()
+    with Console().at_work("diagnose"):
+        time.sleep(1.5)
+    Console.quiet = False
+    assert capsys.readouterr() == ("", "")
+
+
+def test_a_terminal_shows_a_phase_at_once_and_without_colours_where_there_are_none(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    console = on_a_terminal(monkeypatch, 80)
+    with console.at_work("diagnose"):
+        console.phase("looking at the wiring")
+        time.sleep(0.5)
+        console.table("result", ["a"], [[1]])
+    said = capsys.readouterr().err
+    assert "looking at the wiring, 0 s" in said and "result" in said
+    assert not re.search(r"\x1b\[[\d;]*3\d[\d;]*m", said)
 
 
 def test_quiet_shows_no_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

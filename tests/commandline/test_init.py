@@ -30,7 +30,7 @@ def test_what_it_says_to_type_works(place: Path) -> None:
     done(*picture, folder=place)
     done(*collect, *SHORT, folder=place)
     parents = json.loads((place / "runs/mine_sim/collect_real/manifest.json").read_text())["parents"]
-    assert sorted(one["role"] for one in parents) == ["world.robot", "world.robot.urdf"]
+    assert sorted(parent["role"] for parent in parents) == ["world.robot", "world.robot.urdf"]
     composed = json.loads(done(*diagnose, "--cfg", "job", "--json", folder=place).out)
     assert composed["sim"]["robot"] == "mine/robot.yaml"
 
@@ -52,8 +52,8 @@ def test_it_takes_torque_and_speed_for_placeholders_and_a_choice_of_joints(place
     file.write_text(file.read_text().replace('effort="3"', 'effort="0"'))
     assert "joints.turn: has effort 0, a placeholder" in refused("init", f"urdf={file}", "name=mine", folder=place)
     done("init", f"urdf={file}", "name=mine", "effort=2.5", "joints=[elbow,turn]", folder=place)
-    told = yaml.safe_load((place / "mine/robot.yaml").read_text())
-    assert [*told["joints"]] == ["elbow", "turn"] and told["joints"]["turn"]["effort"] == 2.5
+    robot = yaml.safe_load((place / "mine/robot.yaml").read_text())
+    assert [*robot["joints"]] == ["elbow", "turn"] and robot["joints"]["turn"]["effort"] == 2.5
 
 
 @pytest.mark.parametrize(
@@ -78,7 +78,7 @@ def test_it_takes_torque_and_speed_for_placeholders_and_a_choice_of_joints(place
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(arguments: str, line: str, place: Path) -> None:
     assert line in refused("init", *arguments.split(), folder=place)
-    assert sorted(one.name for one in place.iterdir()) == ["models"]
+    assert sorted(path.name for path in place.iterdir()) == ["models"]
 
 
 def test_an_edited_urdf_is_noticed_and_a_moved_one_is_not(place: Path) -> None:
@@ -89,8 +89,8 @@ def test_an_edited_urdf_is_noticed_and_a_moved_one_is_not(place: Path) -> None:
     shutil.copy(place / "models/arm.urdf", place / "moved.urdf")
     assert collect("moved.urdf")[1].strip().endswith("(unchanged)")
     (place / "moved.urdf").write_text(EXAMPLE.read_text().replace('mass value="0.3"', 'mass value="0.31"'))
-    code, _, told = collect("moved.urdf")
-    assert code == 2 and "was built otherwise (changed: the data of world.robot)" in told
+    code, _, message = collect("moved.urdf")
+    assert code == 2 and "was built otherwise (changed: the data of world.robot)" in message
 
 
 @pytest.mark.parametrize(
@@ -122,8 +122,10 @@ def test_a_log_that_lacks_a_joint(place: Path) -> None:
     done("collect", *arm, "name=log", folder=place)
     (place / "more.urdf").write_text(EXAMPLE.read_text().replace('"elbow"', '"wrist"'))
     line = refused("diagnose", "real=log", "sim=urdf", "sim.robot=more.urdf", "out=runs/refused", folder=place)
-    told = "It lacks wrist; choose the simulator with sim=, or hold the joint in a robot file (docs/howto/own-robot.md)"
-    assert told in line
+    message = (
+        "It lacks wrist; choose the simulator with sim=, or hold the joint in a robot file (docs/howto/own-robot.md)"
+    )
+    assert message in line
 
 
 PAGE = (Path(__file__).parents[2] / "docs/howto/own-robot.md").read_text()

@@ -67,4 +67,4 @@ def test_the_path_of_an_effect_is_found_in_a_key(key: str, path: str) -> None:
 
 
 def test_the_key_is_what_stands_before_the_first_equals_sign() -> None:
-    assert [key_of(one) for one in ("a=b=c", "++a.b=1", "~a")] == ["a", "a.b", "a"]
+    assert [key_of(override) for override in ("a=b=c", "++a.b=1", "~a")] == ["a", "a.b", "a"]

@@ -86,7 +86,7 @@ def test_it_stands_beside_ours(mine: type) -> None:
 
 
 def test_it_is_searched_within_its_documented_range(mine: type) -> None:
-    (candidate,) = (one for one in library(nao()) if one.effect == NAME)
+    (candidate,) = (entry for entry in library(nao()) if entry.effect == NAME)
     np.testing.assert_array_equal(candidate.documented, [[0.0], [1.0]])
     assert candidate.free == ("thickness",) and candidate.scope == "all"
 

@@ -55,7 +55,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def listed(*words: str, folder: Path) -> list[str]:
     artifacts = json.loads(done("runs", *words, "--json", folder=folder).out)["artifacts"]
-    return [one["folder"].removeprefix("runs/") for one in artifacts]
+    return [artifact["folder"].removeprefix("runs/") for artifact in artifacts]
 
 
 def test_runs_are_sorted_by_any_metric_and_the_last_ones_are_kept(home: Path) -> None:
@@ -85,7 +85,9 @@ def test_runs_are_chosen_by_one_word(word: str, left: list[str], home: Path) -> 
 @pytest.mark.parametrize(
     ("word", "line"),
     [
-        ("sort=falls", "did you mean of.falls"), ("kind=fly", "there is evaluate, optimize"), ("newer=soon", "7d"),
+        ("sort=falls", "did you mean of.falls? There is best, of.falls"),
+        ("sort=speed", "none of these artifacts has this metric; there is best, of.falls"),
+        ("kind=fly", "there is evaluate, optimize"), ("newer=soon", "7d"),
         ("metric=best>much", "condition"), ("limit=-1", "at least 0"), ("colour=red", "no such setting"),
         ("best", "name=value"), ("world=mars", "no artifact"),
     ],
@@ -95,10 +97,10 @@ def test_a_wrong_word_of_runs_is_one_line(word: str, line: str, home: Path) -> N
 
 
 def test_diff_shows_what_differs_and_nothing_else(home: Path) -> None:
-    told = json.loads(done("diff", "walk0/optimize", "walk1", "--json", folder=home).out)
-    assert told["metrics"] == {"best": [0.3, 0.1], "of.falls": [0, 1]}
-    assert told["settings"] == told["metrics"]  # the stage reports what it was made with
-    assert (told["made_from"], told["software"], told["same"]) == ({}, {}, False)
+    report = json.loads(done("diff", "walk0/optimize", "walk1", "--json", folder=home).out)
+    assert report["metrics"] == {"best": [0.3, 0.1], "of.falls": [0, 1]}
+    assert report["settings"] == report["metrics"]  # the stage reports what it was made with
+    assert (report["made_from"], report["software"], report["same"]) == ({}, {}, False)
     assert "-0.2" in done("diff", "walk0/optimize", "walk1", folder=home).out
     assert "the same settings" in done("diff", "walk1", "walk1", folder=home).out
     assert "did you mean walk1" in refused("diff", "walk1", "walc1", folder=home)

@@ -118,12 +118,51 @@ def test_the_refusal_says_what_to_type_and_that_is_enough(place: Path) -> None:
         words = [sys.executable, "-m", "gsl", *command, *more]
         return subprocess.run(words, cwd=place, env=environment, capture_output=True, text=True, check=False)
 
-    told = run()
-    assert told.returncode == 2
-    assert "say trust=lab_world if" in told.stderr
+    result = run()
+    assert result.returncode == 2
+    assert "say trust=lab_world if" in result.stderr
     assert run("trust=lab_world").returncode == 0
     manifest = json.loads((place / "runs/x/collect_real/manifest.json").read_text())
     assert manifest["trust"] == ["lab_world"]
+
+
+REFERRING = {
+    "robot: ${sim.robot}": "mapping.robot: refers to sim.robot, and this command has no such setting; ",
+    "robot: ${mapping.robot}": "mapping.robot: refers to itself; ",
+    "about: {x: ['${mapping.about.x[0]}']}": "mapping.about.x[0]: refers to itself; ",
+    'about: {x: "${oc.select:}"}': "mapping.about.x: refers to a setting in a way that cannot be read; ",
+}
+
+
+@pytest.mark.parametrize("line", REFERRING)
+def test_a_reference_to_nothing_is_told_in_our_words(line: str, place: Path) -> None:
+    (place / "m.yaml").write_text(f"{SIGNALS}{line}\n")
+    said = refused("import", "source=log.csv", "mapping=m.yaml", "--check", folder=place)
+    assert said == f"{REFERRING[line]}write the value itself"
+
+
+@pytest.mark.parametrize("key", ["force", "out", "executor", "address", "check", "accept", "memory"])
+def test_a_setting_of_the_command_is_none_of_a_mapping(key: str, place: Path) -> None:
+    (place / "m.yaml").write_text(f"{SIGNALS}{key}: true\n")
+    said = refused("import", "source=log.csv", "mapping=m.yaml", folder=place)
+    assert said == f"mapping.{key}: is a setting of the command, and not of mapping; type {key}=... yourself"
+
+
+SHAPELESS = {
+    "defaults: 3": "its `defaults:` are no list of files",
+    "defaults: ['${x}']": "its `defaults:` are no list of files",
+    "defaults: [_self_, _self_]": "its `defaults:` are no list of files",
+    "defaults: [nao_ideal]\nnull: 4": "None is no name of a setting, which is a text",
+    "defaults: [nao_ideal]\nx: !!set {a}": "holds what no setting can be, such as a set",
+    "defaults: [nao_ideal, _self_]\neffects: [1]": "world/w.yaml: says a list where settings by name are",
+}
+
+
+@pytest.mark.parametrize("text", SHAPELESS)
+def test_a_file_of_another_shape_is_told_in_our_words(text: str, place: Path) -> None:
+    (place / "theirs/world").mkdir(parents=True)
+    (place / "theirs/world/w.yaml").write_text(f"{text}\n")
+    assert SHAPELESS[text] in refused("collect", "--config-dir", "theirs", "world=w", folder=place)
 
 
 def test_an_effect_of_somebody_else_is_not_imported(place: Path) -> None:
@@ -209,10 +248,10 @@ def test_a_request_calls_nothing(target: str, place: Path) -> None:
         refused("rehearse", "request=asked", folder=place),
     ]
     runner = [sys.executable, "asked/runner.py", "--dry-run"]
-    told = subprocess.run(runner, cwd=place, env=ENVIRONMENT, capture_output=True, text=True, check=False)
-    assert told.returncode == 2
-    for one in (*said, told.stdout):
-        assert "policy._target_" in one or "policy = " in one, one
+    result = subprocess.run(runner, cwd=place, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert result.returncode == 2
+    for message in (*said, result.stdout):
+        assert "policy._target_" in message or "policy = " in message, message
 
 
 @pytest.mark.parametrize("name", ["argparse.py", "numpy/__init__.py", "json.pyc", "gsl/runner/evil.py", "link"])
@@ -251,7 +290,7 @@ BOMB = "a: &a [x, x]\n" + "".join(
     f"{b}: &{b} [*{a}, *{a}]\n" for a, b in zip("abcdefghijkl", "bcdefghijklm", strict=True)
 )
 HOSTILE = {
-    "nested aliases": f"{SIGNALS}about:\n" + "".join(f"  {one}\n" for one in (BOMB * 1).splitlines())
+    "nested aliases": f"{SIGNALS}about:\n" + "".join(f"  {line}\n" for line in (BOMB * 1).splitlines())
     + "".join(f"  z{k}: [*m, *m, *m, *m, *m, *m, *m, *m]\n" for k in range(9)),
     "an alias of itself": f"{SIGNALS}about: &a [*a]\n",
     "too deep": f"{SIGNALS}about: {'[' * 5000}{']' * 5000}\n",
@@ -414,12 +453,15 @@ def test_the_files_of_a_robot_are_written_over_nobodys(place: Path) -> None:
 
 
 def test_code_is_found_wherever_plain_data_names_it() -> None:
-    told = {"a": [{"_target_": "os.system"}], "world": {"_target_": "gsl.worlds.bullet.BulletWorld", "robot": "x.y"}}
-    assert [path for path, _, _ in code_in(told)] == ["a.0._target_", "world.robot"]
-    assert modules_in(told) == ("os", "x")
-    check_code(told, ["os", "x"])
+    document = {
+        "a": [{"_target_": "os.system"}],
+        "world": {"_target_": "gsl.worlds.bullet.BulletWorld", "robot": "x.y"},
+    }
+    assert [path for path, _, _ in code_in(document)] == ["a.0._target_", "world.robot"]
+    assert modules_in(document) == ("os", "x")
+    check_code(document, ["os", "x"])
     with pytest.raises(ConfigError, match=r"a\.0\._target_ = os\.system: is of Python's own library"):
-        check_code(told, ["x"])
+        check_code(document, ["x"])
     two = {"a": {"_target_": "lab.A"}, "b": {"_target_": "mine.B"}}
     with pytest.raises(ConfigError, match=r"a\._target_ = lab\.A: .* say 'trust=\[mine,lab\]'"):
         check_code(two, ["misspelt", "mine"])

@@ -6,6 +6,7 @@ import itertools
 
 import pytest
 
+from gsl.core.compiling import count_compilation
 from gsl.core.workload import Part, Workload
 
 
@@ -72,25 +73,64 @@ def test_the_time_left_is_that_of_the_plan_until_the_clock_knows_better() -> Non
     with load.plan("stage", [Part(100.0, 100)]), load.loop(100, "walking") as loop:
         assert load.left() == pytest.approx(100.0)
         for _ in range(50):
-            clock.now += 3.0  # thrice as slow as foreseen
+            clock.now += 3.0  # three times as slow as foreseen
             loop.advance()
         assert load.left() == pytest.approx(150.0, rel=0.1)
         clock.now += 20.0  # while a step goes on
         assert load.left() == pytest.approx(130.0, rel=0.1)
+        clock.now += 200.0
+        assert load.left() == 0.0 and "left" not in load.text()
 
 
 def test_what_was_done_before_is_no_pace() -> None:
     load, clock, _ = work()
     with load.loop(100, "walking") as loop:
         assert load.left() is None
-        loop.advance(80, worked=False)
+        loop.advance(79, worked=False)
         assert load.left() is None
+        loop.advance()
         clock.now += 10.0
         loop.advance(10)
         assert load.left() == pytest.approx(10.0)
-        assert load.text() == "90 % done, 10 s left; walking: 90 of 100, 1.0 a second"
+        assert load.text() == "90 % done, about 10 s left; walking: 90 of 100, 1.0 a second"
         clock.now += 10.0
         assert "2.0 s each" in load.text()
+
+
+@pytest.mark.parametrize("seconds", [0.0, 20.0])
+def test_the_first_step_which_compiles_is_no_pace(seconds: float) -> None:
+    load, clock, _ = work()
+    with load.plan("stage", [Part(seconds, 21)]), load.loop(21, "walking") as loop:
+        clock.now += 120.0
+        loop.advance()
+        assert "each" not in load.text() and (load.left() is None or seconds)
+        for _ in range(10):
+            clock.now += 1.0
+            loop.advance()
+        assert load.left() == pytest.approx(10.0, rel=0.1)
+        assert load.text() == "52 % done, about 10 s left; stage 1 of 1, walking: 11 of 21, 1.0 a second"
+
+
+def test_a_phase_has_its_own_clock_until_a_loop_or_a_part_says_more() -> None:
+    load, clock, _ = work()
+    with load.at_work("diagnose"):
+        clock.now += 2.0
+        assert load.text() == "diagnose, 2 s"
+        load.enter("looking at the wiring")
+        clock.now += 3.0
+        assert load.text() == "looking at the wiring, 3 s"
+        count_compilation(1)
+        assert load.text() == "looking at the wiring, 3 s, compiling, once after an installation"
+        count_compilation(-1)
+        with load.plan("fold", [Part(), Part()]):
+            load.begin("gain 8")
+            assert load.text() == "0 % done; fold 1 of 2 (gain 8)"
+            load.enter("searching")
+            assert load.text() == "0 % done; fold 1 of 2 (gain 8), searching, 0 s"
+            with load.loop(2, "replaying"):
+                assert load.text() == "0 % done; fold 1 of 2 (gain 8), replaying: 0 of 2"
+            load.finish()
+    assert load.text() == ""
 
 
 def test_each_work_begins_anew() -> None:
@@ -101,5 +141,5 @@ def test_each_work_begins_anew() -> None:
             loop.fell(1)
             clock.now += 1.0
             loop.advance()
-            assert load.text() == "50 % done, 1 s left; walking: 1 of 2, 1.0 a second; best 1.0 m, 1 fall"
+            assert load.text() == "50 % done; walking: 1 of 2; best 1.0 m, 1 fall"
     assert load.text() == ""

@@ -25,7 +25,7 @@ MASKS = {"all": np.ones(15, dtype=bool), "legs": np.arange(15) < 11, "arms": np.
 
 
 def candidate(effect: str, *free: str):
-    return next(one for one in library(NAO) if one.effect == effect and one.free == free)
+    return next(entry for entry in library(NAO) if entry.effect == effect and entry.free == free)
 
 
 def test_a_factor_that_all_joints_share_goes_to_the_gain_and_the_rest_stays() -> None:
@@ -55,10 +55,10 @@ def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
     paths = [path + np.array([NAO.stance.get(motor, 0.0) for motor in NAO.motors]) for path in paths]
     rng = np.random.default_rng(0)
     played = Held.of(apply_all(plant, build(effects)), 0.002, PERIOD).play(paths, [path[0] for path in paths], 25)
-    logged = [told[:, :15] + 0.001 * rng.standard_normal((len(told), 15)) for told in played]
+    logged = [path[:, :15] + 0.001 * rng.standard_normal((len(path), 15)) for path in played]
     episodes = tuple(
-        Trajectory(PERIOD * np.arange(151), path[:, :15], told, np.zeros_like(told))
-        for path, told in zip(paths, logged, strict=True)
+        Trajectory(PERIOD * np.arange(151), path[:, :15], measured, np.zeros_like(measured))
+        for path, measured in zip(paths, logged, strict=True)
     )
     batch = Batch(
         episodes, NAO.controlled, PERIOD, {"episodes": [{"policy": str(k)} for k in range(4)], "world": {"step": 0.002}}
@@ -67,5 +67,5 @@ def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
     friction = candidate("coulomb_friction", "torque")
     everywhere = problem.fit((friction,), np.array([0.15]), no_shifts(15), every=1)
     apart = Search(problem, problem.fit_calibration()).split(everywhere)
-    found = {one.scope: float(value[0]) for one, value in zip(apart.candidates, apart.parameters, strict=True)}
-    assert found == pytest.approx({"legs": 0.2, "arms": 0.1}, rel=0.1)
+    torques = {part.scope: float(value[0]) for part, value in zip(apart.candidates, apart.parameters, strict=True)}
+    assert torques == pytest.approx({"legs": 0.2, "arms": 0.1}, rel=0.1)

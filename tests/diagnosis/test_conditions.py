@@ -43,7 +43,7 @@ LATE, STICKY = {"command_latency": {"delay": 0.04}}, {"viscous_friction": {"coef
 
 
 def labelled(batch: Batch, **more: Any) -> Batch:
-    labels = [{**one, **more} for one in batch.metadata["episodes"]]
+    labels = [{**labels_of, **more} for labels_of in batch.metadata["episodes"]]
     return replace(batch, metadata={**batch.metadata, "episodes": labels})
 
 
@@ -61,21 +61,21 @@ def both(**cause: Any) -> Batch:
 
 def test_what_is_known_of_a_trajectory_is_no_gap() -> None:
     exp = cut_log(both(), arm())
-    known = simulator_of(exp, nominal(arm()), 0.002)
-    left = exp.comparison.residual(known.simulate({}, no_shifts(2), exp.pieces), exp.pieces)
+    simulator = simulator_of(exp, nominal(arm()), 0.002)
+    left = exp.comparison.residual(simulator.simulate({}, no_shifts(2), exp.pieces), exp.pieces)
     forgotten = replace(exp.pieces, conditions=())
-    gap = exp.comparison.residual(known.simulate({}, no_shifts(2), forgotten), forgotten)
+    gap = exp.comparison.residual(simulator.simulate({}, no_shifts(2), forgotten), forgotten)
     assert np.sqrt(np.mean(left**2)) == pytest.approx(1.0, abs=0.1)
     assert np.sqrt(np.mean(gap**2)) > 5.0
 
 
 def test_a_cause_is_found_beside_what_is_known() -> None:
     options = replace(FEW, held_out={"gain": 0.5}, most=2)
-    found = diagnose(both(command_latency={"delay": 0.016}), nominal(arm()), 0.002, options, lambda _: None)
-    assert found.selection.chosen.names == ("command_latency",)
-    held = {found.log.records[k].about["gain"] for k in found.log.pieces.record[found.log.held_out]}
+    findings = diagnose(both(command_latency={"delay": 0.016}), nominal(arm()), 0.002, options, lambda _: None)
+    assert findings.selection.chosen.names == ("command_latency",)
+    held = {findings.log.records[k].about["gain"] for k in findings.log.pieces.record[findings.log.held_out]}
     assert held == {0.5}
-    assert document(found)["shrinkage"]["fraction"] > 0.95
+    assert document(findings)["shrinkage"]["fraction"] > 0.95
 
 
 def test_repeats_under_other_conditions_are_no_noise() -> None:
@@ -85,7 +85,7 @@ def test_repeats_under_other_conditions_are_no_noise() -> None:
 
 
 @pytest.mark.parametrize(
-    ("one", "other", "same"),
+    ("label", "other", "same"),
     [
         (1, "1", True),
         (100, 100.0, True),
@@ -97,8 +97,8 @@ def test_repeats_under_other_conditions_are_no_noise() -> None:
         ("nan", float("nan"), True),
     ],
 )
-def test_labels_are_numbers_however_they_are_written(one: Any, other: Any, same: bool) -> None:
-    assert alike(one, other) is alike(other, one) is same
+def test_labels_are_numbers_however_they_are_written(label: Any, other: Any, same: bool) -> None:
+    assert alike(label, other) is alike(other, label) is same
 
 
 def test_a_label_that_is_text_can_be_held_out_by_its_number() -> None:
@@ -136,8 +136,8 @@ def test_a_joint_without_torque_leaves_a_window_out_whichever_joint_it_is() -> N
     whole = log({})
     rows = len(whole.episodes[0]) + 1
     off = np.arange(rows) < 75
-    one = replace(whole.episodes[0], sensors={"enabled.a": off, "enabled.b": np.ones(rows, dtype=bool)})
-    exp = cut_log(replace(whole, episodes=(one, *whole.episodes[1:])), arm())
+    partly = replace(whole.episodes[0], sensors={"enabled.a": off, "enabled.b": np.ones(rows, dtype=bool)})
+    exp = cut_log(replace(whole, episodes=(partly, *whole.episodes[1:])), arm())
     first, second = exp.order.index(0), exp.order.index(1)
     np.testing.assert_array_equal(exp.records[first].driven, off)
     assert (exp.pieces.tick[exp.pieces.record == first] + exp.pieces.real.shape[1]).max() <= 75
@@ -150,8 +150,8 @@ def test_a_whole_replay_is_of_what_is_driven() -> None:
     flags = {"late": rows >= 20, "between": (rows >= 20) & (rows < 90), "first": rows < 90, "never": rows < 0}
     episodes = tuple(replace(whole.episodes[0], sensors={"enabled": works}) for works in flags.values())
     every = cut_log(whole, arm())
-    found = to_records(replace(whole, episodes=episodes, metadata={}), arm())
-    errors = mean_errors(simulator_of(every, nominal(arm()), 0.002), {}, no_shifts(2), found, arm())
+    records = to_records(replace(whole, episodes=episodes, metadata={}), arm())
+    errors = mean_errors(simulator_of(every, nominal(arm()), 0.002), {}, no_shifts(2), records, arm())
     assert np.isfinite(errors[:3]).all() and errors[:3].max() < 0.01
     assert np.isnan(errors[3]).all()
 
@@ -170,7 +170,7 @@ def test_a_log_says_whether_its_clocks_are_apart_and_the_command_line_wins(tmp_p
     assert not share_clock(apart, None) and clock_caveat(apart, None) is None
     assert share_clock(apart, "synchronised") and not share_clock(apart, "unsynchronised")
     assert clock_caveat(apart, "unsynchronised") is None
-    told = "The log says that its clocks are unsynchronised; clocks=synchronised was asked for and counts."
+    warning = "The log says that its clocks are unsynchronised; clocks=synchronised was asked for and counts."
     line = (
         "real=logs/b.parquet",
         "sim.robot=blind_arm.arm",
@@ -184,18 +184,18 @@ def test_a_log_says_whether_its_clocks_are_apart_and_the_command_line_wins(tmp_p
     for asked, caveats, causes in (("null", 0, []), ("synchronised", 1, ["command_latency"])):
         done("diagnose", *line, small, f"clocks={asked}", f"name=c_{asked}", folder=tmp_path)
         report = json.loads((tmp_path / f"runs/c_{asked}/diagnose/report.json").read_text())
-        assert report["caveats"].count(told) == caveats
-        assert [one["effect"] for one in report["causes"]] == causes
+        assert report["caveats"].count(warning) == caveats
+        assert [cause["effect"] for cause in report["causes"]] == causes
 
 
 def test_a_table_says_what_it_leaves_out_of_its_means() -> None:
     errors = {AS_IT_WAS: [0.004, 0.006, np.nan], "usual": [0.002, 0.002, np.nan], DIAGNOSED: [0.001, np.nan, np.nan]}
     fold = Fold([1], "causes", ["backlash"], {}, 0.5, None, ["a", "b", "c"], errors)
-    told = table([fold, replace(fold, values=[2, 3], errors=dict.fromkeys(errors, [np.nan] * 3))], "day")
-    assert "nan" not in told
-    assert "| 4.0 " in told and "| 2, 3 " in told and "in 1 of 1 trajectories" in told
-    assert "5 of 6 trajectories are in no mean" in told
-    assert "(as it was 4, usual 4, diagnosed 5; 4 in every replay)" in told
+    text = table([fold, replace(fold, values=[2, 3], errors=dict.fromkeys(errors, [np.nan] * 3))], "day")
+    assert "nan" not in text
+    assert "| 4.0 " in text and "| 2, 3 " in text and "in 1 of 1 trajectories" in text
+    assert "5 of 6 trajectories are in no mean" in text
+    assert "(as it was 4, usual 4, diagnosed 5; 4 in every replay)" in text
 
 
 CAUSE = {"command_latency": {"delay": 0.016}}
@@ -210,21 +210,21 @@ def written(made: Batch, path: Path) -> None:
 
 
 def folds(folder: Path) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = json.loads((folder / "folds.json").read_text())
-    return found
+    rows: list[dict[str, Any]] = json.loads((folder / "folds.json").read_text())
+    return rows
 
 
 def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
     written(both(**CAUSE), tmp_path / "logs.parquet")
     done("cross-validate", "real=logs.parquet", *LINE, SMALL, "name=c", folder=tmp_path)
     folder = tmp_path / "runs/c/cross_validate"
-    assert [one["values"] for one in folds(folder)] == [[0.5], [1.0]]
-    assert all(one["causes"] == ["command_latency"] for one in folds(folder))
-    for one in folds(folder):
-        errors = {way: np.mean(values) for way, values in one["errors"].items()}
+    assert [fold["values"] for fold in folds(folder)] == [[0.5], [1.0]]
+    assert all(fold["causes"] == ["command_latency"] for fold in folds(folder))
+    for fold in folds(folder):
+        errors = {way: np.mean(values) for way, values in fold["errors"].items()}
         assert errors["diagnosed"] < 0.3 * errors["coulomb + viscous"]
         assert errors["diagnosed"] < 0.3 * errors["as it was"]
-        assert len(one["names"]) == len(one["errors"]["GAT"]) == len(one["errors"]["diagnosed + GAT"]) == 9
+        assert len(fold["names"]) == len(fold["errors"]["GAT"]) == len(fold["errors"]["diagnosed + GAT"]) == 9
     assert "in 18 of 18 trajectories" in (folder / "table.md").read_text()
     said = refused("cross-validate", "real=logs.parquet", *LINE[:-1], "by=date", folder=tmp_path)
     assert said == "by = date: needs a label with two values at least; the log's labels: gain, policy"
@@ -269,69 +269,73 @@ def untouched() -> LoadedTransformation:
     return LoadedTransformation(forward, Solver(forward, np.eye(2), 0.5), alpha=0.0)
 
 
-def shortened(one: Trajectory, ticks: int) -> Trajectory:
+def shortened(episode: Trajectory, ticks: int) -> Trajectory:
     rows = slice(0, ticks + 1)
     return replace(
-        one, time=one.time[rows], action=one.action[:ticks], position=one.position[rows], velocity=one.velocity[rows]
+        episode,
+        time=episode.time[rows],
+        action=episode.action[:ticks],
+        position=episode.position[rows],
+        velocity=episode.velocity[rows],
     )
 
 
 def test_a_grounding_that_does_nothing_replays_as_the_chain_does() -> None:
-    found = to_records(both(**CAUSE), arm())
+    records = to_records(both(**CAUSE), arm())
     simulated = replace(bare(), effects={"coulomb_friction": {"torque": 0.05}}, nuisances=no_shifts(2) + 0.01)
-    for one in (found[0], found[-1]):
-        other = mean_errors(simulated.simulator, simulated.effects, simulated.nuisances, [one], arm())
-        assert simulated.measure_replay(one, untouched(), 1) == pytest.approx(other.mean(), rel=1e-3)
+    for record in (records[0], records[-1]):
+        other = mean_errors(simulated.simulator, simulated.effects, simulated.nuisances, [record], arm())
+        assert simulated.measure_replay(record, untouched(), 1) == pytest.approx(other.mean(), rel=1e-3)
 
 
 @pytest.mark.parametrize(("cause", "residual", "left"), [(LATE, False, 0.85), (STICKY, True, 0.85)])
 def test_a_learned_grounding_brings_replays_nearer(cause: dict[str, Any], residual: bool, left: float) -> None:
-    found = to_records(log(cause, jitter=0.0), arm())
-    errors = learning(residual=residual).errors(bare(), found[:6], found[6:], 1)
-    assert np.mean(errors) < left * mean_errors(bare().simulator, {}, no_shifts(2), found[6:], arm()).mean()
+    records = to_records(log(cause, jitter=0.0), arm())
+    errors = learning(residual=residual).errors(bare(), records[:6], records[6:], 1)
+    assert np.mean(errors) < left * mean_errors(bare().simulator, {}, no_shifts(2), records[6:], arm()).mean()
 
 
 @pytest.mark.parametrize("delay", [0.02, 0.03, 0.04])
 def test_on_top_of_a_diagnosed_delay_a_grounding_looks_over_it(delay: float) -> None:
-    known = {"command_latency": {"delay": delay}}
-    found, late = to_records(log({**known, **STICKY}, jitter=0.0), arm()), replace(bare(), effects=known)
-    before = mean_errors(late.simulator, known, no_shifts(2), found[6:], arm()).mean()
-    assert np.mean(learning().errors(late, found[:6], found[6:], 1)) < 0.85 * before
+    latency = {"command_latency": {"delay": delay}}
+    records, late = to_records(log({**latency, **STICKY}, jitter=0.0), arm()), replace(bare(), effects=latency)
+    before = mean_errors(late.simulator, latency, no_shifts(2), records[6:], arm()).mean()
+    assert np.mean(learning().errors(late, records[:6], records[6:], 1)) < 0.85 * before
 
 
 def test_a_correction_of_a_simulator_that_knows_gains_is_better_at_another_gain_than_a_model_of_logs() -> None:
-    found = to_records(both(viscous_friction={"coefficient": 0.4}), arm())
-    errors = {how: learning(residual=how).errors(bare(), found[:9], found[9:], 1) for how in (True, False)}
+    records = to_records(both(viscous_friction={"coefficient": 0.4}), arm())
+    errors = {how: learning(residual=how).errors(bare(), records[:9], records[9:], 1) for how in (True, False)}
     assert np.mean(errors[True]) < 0.7 * np.mean(errors[False])
 
 
 def test_too_few_trajectories_teach_no_grounding() -> None:
     made = log({})
-    short = tuple(shortened(one, 10) for one in made.episodes)
+    short = tuple(shortened(episode, 10) for episode in made.episodes)
     for episodes in (made.episodes[:2], (*made.episodes[:2], *short)):
-        found = to_records(replace(made, episodes=episodes, metadata={}), arm())
+        records = to_records(replace(made, episodes=episodes, metadata={}), arm())
         with pytest.raises(
             ConfigError, match="fewer than 3 trajectories of 29 control periods to learn from; gat=null"
         ):
-            learning().errors(bare(), found, found, 1)
+            learning().errors(bare(), records, records, 1)
 
 
 def test_short_trajectories_are_played_whole() -> None:
     made = log({})
-    episodes = (*made.episodes[:2], *(shortened(one, 60) for one in made.episodes[2:4]))
-    found = to_records(replace(made, episodes=episodes, metadata={}), arm())
-    assert [len(one) for one in bare().play(found, {}, 0.0, 1)] == [100, 100, 60, 60]
-    assert np.isfinite(learning().errors(bare(), found, found, 1)).all()
+    episodes = (*made.episodes[:2], *(shortened(episode, 60) for episode in made.episodes[2:4]))
+    records = to_records(replace(made, episodes=episodes, metadata={}), arm())
+    assert [len(path) for path in bare().play(records, {}, 0.0, 1)] == [100, 100, 60, 60]
+    assert np.isfinite(learning().errors(bare(), records, records, 1)).all()
 
 
 def test_replays_beside_others_have_no_noise_and_say_when_they_diverge() -> None:
-    found = to_records(log({}), arm())[:3]
+    records = to_records(log({}), arm())[:3]
     noisy = replace(bare(), effects={"encoder_noise": {"sd": 0.01}, "action_noise": {"sd": 0.05}})
-    assert noisy.measure_replay(found[0], untouched(), 1) == pytest.approx(
-        bare().measure_replay(found[0], untouched(), 1), rel=1e-6
+    assert noisy.measure_replay(records[0], untouched(), 1) == pytest.approx(
+        bare().measure_replay(records[0], untouched(), 1), rel=1e-6
     )
     wild = replace(bare(), effects={"viscous_friction": {"coefficient": 50.0}})
-    assert np.isnan(wild.measure_replay(found[0], untouched(), 1))
+    assert np.isnan(wild.measure_replay(records[0], untouched(), 1))
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,8 @@ from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import to_records
-from gsl.diagnosis.log.residual import noise_floor
+from gsl.diagnosis.log.repeats import find_repeats
+from gsl.diagnosis.log.residual import NoiseFloor, noise_floor
 from gsl.diagnosis.search.screening import interpolate
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.verdict.document import document
@@ -77,7 +78,7 @@ def test_an_effect_of_ones_own_is_a_cause_like_ours_and_a_hook_is_left_out_by_na
     assert result.selection.chosen.names == ("cold_grease",), result.verdict
     assert result.selection.chosen.parameters[0][0] == pytest.approx(0.5, rel=0.1)
     assert "without magnet, whose torque hook acts in Bullet alone" in said
-    assert "magnet" not in {one.effect for one in result.problem.library}
+    assert "magnet" not in {candidate.effect for candidate in result.problem.library}
 
 
 @pytest.mark.parametrize("effect", CAUSES)
@@ -94,23 +95,23 @@ def test_a_cause_is_named_with_its_value(effect: str) -> None:
 
 def test_a_fault_of_one_joint_is_named_there() -> None:
     result = found({"servo_gain": {"kp": 0.6, "joints": "elbow"}})
-    assert [one.scope for one in result.selection.chosen.candidates] == ["elbow"]
+    assert [candidate.scope for candidate in result.selection.chosen.candidates] == ["elbow"]
     shares = {place["joint"]: place["share"] for place in document(result)["where"] if place["regime"] == "all"}
     assert shares["elbow"] > 0.8 and sum(shares.values()) == pytest.approx(1.0)
 
 
 def test_a_simulator_fifty_times_too_stiff_is_told_so() -> None:
     stiff = replace(arm(), gains=dict.fromkeys(("shoulder", "elbow"), (2000.0, 4.0)), ranges=WIDE)
-    told = diagnose(log({}), nominal(stiff), 0.002, replace(QUICK, most=2), lambda _: None)
-    chosen = told.selection.chosen
-    assert not {"coulomb_friction", "viscous_friction"} & set(told.selection.screening.invisible)  # once it is soft
+    findings = diagnose(log({}), nominal(stiff), 0.002, replace(QUICK, most=2), lambda _: None)
+    chosen = findings.selection.chosen
+    assert not {"coulomb_friction", "viscous_friction"} & set(findings.selection.screening.invisible)  # once it is soft
     assert chosen.names == ("servo_gain",) and chosen.candidates[0].scope == "all"
-    found = chosen.candidates[0].entry(chosen.parameters[0])
-    assert (found["kp"], found["kd"]) == (pytest.approx(0.02, rel=0.1), pytest.approx(0.25, rel=0.1))
+    entry = chosen.candidates[0].entry(chosen.parameters[0])
+    assert (entry["kp"], entry["kd"]) == (pytest.approx(0.02, rel=0.1), pytest.approx(0.25, rel=0.1))
 
 
 def test_what_a_wide_range_holds_is_meant_in_factors() -> None:
-    gain = next(one for one in library(replace(arm(), ranges=WIDE)) if one.free == ("kp",))
+    gain = next(candidate for candidate in library(replace(arm(), ranges=WIDE)) if candidate.free == ("kp",))
     np.testing.assert_allclose(gain.grid[:5, 0], 0.004 ** np.array([0.05, 0.15, 0.35, 0.65, 1.0]))
     assert gain.claims_its_name(np.array([0.003])) and not gain.claims_its_name(np.array([0.002]))
     assert gain.towards(np.array([0.004]), 0.5) == pytest.approx(np.sqrt(0.004))
@@ -121,21 +122,21 @@ def test_what_a_wide_range_holds_is_meant_in_factors() -> None:
 def test_two_causes_at_once() -> None:
     result = found({"command_latency": {"delay": 0.02}, "coulomb_friction": {"torque": 0.15}}, most=2)
     assert set(result.selection.chosen.names) == {"command_latency", "coulomb_friction"}
-    assert all(one.rival is not None for one in result.verdict.causes)  # each was challenged in its place
+    assert all(cause.rival is not None for cause in result.verdict.causes)  # each was challenged in its place
 
 
 def test_one_motion_alone_makes_nobody_sure() -> None:
     whole = log({"command_latency": {"delay": 0.016}})
-    steps = [one for one, about in zip(whole.episodes, whole.metadata["episodes"], strict=True)
+    steps = [episode for episode, about in zip(whole.episodes, whole.metadata["episodes"], strict=True)
              if about["policy"] == "steps_a"][0]  # fmt: skip
     lone = replace(whole, episodes=(steps,), metadata={"episodes": [{"policy": "steps_a"}]})
-    found = document(diagnose(lone, nominal(arm()), 0.002, QUICK, lambda _: None))
-    assert [cause["effect"] for cause in found["causes"]] == ["command_latency"]
-    assert found["causes"][0]["probability"] <= 0.8 and not found["sure"]
-    assert found["summary"].partition("it leaves is ")[2].startswith("probably caused by command latency")
-    assert any(one.startswith("There is one motion only") for one in found["caveats"])
-    (told,) = [one for one in summary_lines(found) if one.title == "what next"]
-    assert "Mind: There is one motion only" in str(told.caption)
+    report = document(diagnose(lone, nominal(arm()), 0.002, QUICK, lambda _: None))
+    assert [cause["effect"] for cause in report["causes"]] == ["command_latency"]
+    assert report["causes"][0]["probability"] <= 0.8 and not report["sure"]
+    assert report["summary"].partition("it leaves is ")[2].startswith("probably caused by command latency")
+    assert any(caveat.startswith("There is one motion only") for caveat in report["caveats"])
+    (line,) = [line for line in summary_lines(report) if line.title == "what next"]
+    assert "Mind: There is one motion only" in str(line.caption)
 
 
 def test_what_the_library_lacks_is_unknown() -> None:
@@ -158,7 +159,7 @@ def test_a_reference_log_takes_the_model_error_away() -> None:
 def test_a_latency_is_not_claimed_where_clocks_are_apart() -> None:
     result = found({"command_latency": {"delay": 0.03}}, clocks=False)
     assert result.verdict.word == "no_gap" and result.shift == pytest.approx(0.03, abs=0.002)
-    assert any("clocks" in one for one in document(result)["caveats"])
+    assert any("clocks" in caveat for caveat in document(result)["caveats"])
 
 
 def test_the_diagnosed_world_moves_as_the_robot() -> None:
@@ -166,33 +167,37 @@ def test_the_diagnosed_world_moves_as_the_robot() -> None:
     result = found(effects)
     exp = result.log
     world: Plant = apply_all(nominal(arm()), build(result.effects))
-    told = replace(result.simulator, plant=world).simulate({}, calibration.no_shifts(2), exp.pieces)
-    left = exp.comparison.floor * exp.comparison.residual(told, exp.pieces)
+    replayed = replace(result.simulator, plant=world).simulate({}, calibration.no_shifts(2), exp.pieces)
+    left = exp.comparison.floor * exp.comparison.residual(replayed, exp.pieces)
     assert np.sqrt(np.mean(left**2)) < 1.1 * NOISE
 
 
 def test_the_document_has_what_the_contract_asks_for() -> None:
-    told = document(found({"command_latency": {"delay": 0.012}}))
-    (cause,) = told["causes"]
-    assert told["verdict"] == "causes" and cause["effect"] == "command_latency"
+    report = document(found({"command_latency": {"delay": 0.012}}))
+    (cause,) = report["causes"]
+    assert report["verdict"] == "causes" and cause["effect"] == "command_latency"
     delay = cause["parameters"]["delay"]
     assert delay["low"] < delay["value"] < delay["high"] and delay["unit"] == "s"
     assert delay["value"] == pytest.approx(0.012, abs=6e-4)
     assert cause["joints"] == ["shoulder", "elbow"] and 0.5 < cause["probability"] <= 1.0
     assert cause["gain"]["low"] <= cause["gain"]["value"] <= cause["gain"]["high"]
-    shrinkage = told["shrinkage"]
+    shrinkage = report["shrinkage"]
     assert shrinkage["before"] > 1.5 > 1.15 > shrinkage["after"] and shrinkage["fraction"] > 0.9
     assert shrinkage["ceiling_fraction"] is None or shrinkage["ceiling_fraction"] <= 1.0
-    assert all(place["low"] <= place["high"] for place in told["where"])
+    assert all(place["low"] <= place["high"] for place in report["where"])
 
 
 def test_the_noise_floor_comes_from_repeats_and_else_from_roughness() -> None:
+    def measure(batch: Batch, resolution: float = 1e-4) -> NoiseFloor:
+        records = to_records(batch, arm())
+        return noise_floor(records, find_repeats(records, PERIOD), PERIOD, resolution)
+
     batch = log({}, jitter=0.0)
-    measured = noise_floor(to_records(batch, arm()), 1e-4)
+    measured = measure(batch)
     assert measured.source == "repeats" and measured.sd == pytest.approx(NOISE, rel=0.2)
-    alone = noise_floor(to_records(replace(batch, episodes=batch.episodes[:-1], metadata={}), arm()), 1e-4)
+    alone = measure(replace(batch, episodes=batch.episodes[:-1], metadata={}))
     assert alone.source == "estimated" and alone.sd == pytest.approx(NOISE, rel=0.35)
-    assert noise_floor(to_records(log({}, noise=0.0), arm()), 0.01).sd == pytest.approx(0.01 / np.sqrt(12.0))
+    assert measure(log({}, noise=0.0), 0.01).sd == pytest.approx(0.01 / np.sqrt(12.0))
 
 
 @pytest.mark.parametrize("own_names", [True, False])
@@ -243,12 +248,12 @@ def test_the_library_is_tried_whole_but_for_what_is_left_out() -> None:
 
 
 def test_threads_do_not_change_the_answer() -> None:
-    one, other = (
+    single, other = (
         diagnose(log({}, 3), nominal(arm()), 0.002, replace(FEW, threads=threads), lambda phase: None)
         for threads in (1, 3)
     )
-    assert one.selection.none.cost == other.selection.none.cost
-    assert [h.cost for h in one.selection.tried] == [h.cost for h in other.selection.tried]
+    assert single.selection.none.cost == other.selection.none.cost
+    assert [h.cost for h in single.selection.tried] == [h.cost for h in other.selection.tried]
 
 
 @pytest.mark.parametrize("step", [0.002, 0.001])

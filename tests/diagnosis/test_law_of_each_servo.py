@@ -48,10 +48,10 @@ def test_a_filter_that_the_library_lacks_is_unknown_and_its_form_is_said() -> No
     assert findings.verdict.word == "unknown" and findings.verdict.missing > 1.0
     assert {form.joint for form in findings.forms} == {"shoulder", "elbow"}
     assert all(0.005 < form.late < 0.03 for form in findings.forms)
-    told = document(findings)
-    assert [form["joint"] for form in told["forms"]] == [form.joint for form in findings.forms]
-    assert told["causes"] == []
-    assert told["shrinkage"]["fraction"] < told["shrinkage"]["ceiling_fraction"] <= 1.0
+    report = document(findings)
+    assert [form["joint"] for form in report["forms"]] == [form.joint for form in findings.forms]
+    assert report["causes"] == []
+    assert report["shrinkage"]["fraction"] < report["shrinkage"]["ceiling_fraction"] <= 1.0
 
 
 @pytest.mark.slow
@@ -162,3 +162,10 @@ def test_the_ceiling_is_what_laws_leave_of_the_excess() -> None:
 
 def test_older_targets_reach_back_as_far_as_a_replay_remembers() -> None:
     assert HOW.lags < COMMANDS
+
+
+@pytest.mark.parametrize(("joints", "word"), [((0.3, 0.3), "no_gap"), ((0.3, 0.9), "unknown")])
+def test_where_nothing_is_left_a_law_explains_nothing(joints: tuple[float, float], word: str) -> None:
+    """As with a tolerance that is wider than what a calibration leaves."""
+    calm = replace(NONE, costs=np.full(8, 100.0 * np.mean(joints)), levels=np.array(joints))
+    assert Judge(1.0).judge(replace(selection(calm), none=calm), 5.0).word == word

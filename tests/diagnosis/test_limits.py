@@ -13,7 +13,7 @@ from swinging_arm import FEW, arm, found, log
 from gsl.core.plant import nominal
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.simulate.calibration import INERTIA, clip_shifts
-from gsl.diagnosis.verdict.caveats import out_of_family
+from gsl.diagnosis.verdict.caveats import list_first, out_of_family
 from gsl.diagnosis.verdict.limits import Limit, limits
 from gsl.diagnosis.verdict.shrinkage import find_unexplained
 from gsl.report.diagnosis_limits import limits_sentence
@@ -31,7 +31,7 @@ HIDDEN = {
 def left_room(effects: Mapping[str, Any], **how: Any) -> dict[str, Limit]:
     result = diagnose(log(effects, **how), nominal(arm()), 0.002, FEW, lambda _: None)
     assert result.answer.names == ()
-    return {one.effect: one for one in limits(result, NEAR, lambda _: None)}
+    return {limit.effect: limit for limit in limits(result, NEAR, lambda _: None)}
 
 
 @pytest.mark.parametrize("effect", HIDDEN)
@@ -45,12 +45,14 @@ def test_what_hides_below_the_noise_is_within_the_limit(effect: str) -> None:
 def test_limits_are_on_top_of_what_was_named() -> None:
     """Play of no width is not none, since its teeth give: .07 mrad of it would be ruled out for that alone."""
     others = tuple(sorted({*FEW.without} - {"backlash", "zero_offset", "stribeck_friction"}))
-    told = limits(found({"coulomb_friction": {"torque": 0.15}}, without=others), NEAR, lambda _: None)
-    assert next(one.most for one in told if one.effect == "backlash") > 2e-4
-    shares = [one.most / one.documented for one in told]
+    hidden = limits(found({"coulomb_friction": {"torque": 0.15}}, without=others), NEAR, lambda _: None)
+    assert next(limit.most for limit in hidden if limit.effect == "backlash") > 2e-4
+    shares = [limit.most / limit.documented for limit in hidden]
     assert shares == sorted(shares) and shares[-1] <= 0.5
-    assert {"backlash", "command_latency", "load_friction"} <= {one.effect for one in told}
-    assert not {"coulomb_friction", "viscous_friction", "servo_gain", "zero_offset"} & {one.effect for one in told}
+    assert {"backlash", "command_latency", "load_friction"} <= {limit.effect for limit in hidden}
+    assert not {"coulomb_friction", "viscous_friction", "servo_gain", "zero_offset"} & {
+        limit.effect for limit in hidden
+    }
 
 
 def test_where_a_gap_is_unexplained_nothing_is_ruled_out() -> None:
@@ -80,6 +82,12 @@ def test_a_sentence_tells_the_tightest() -> None:
     )
     assert str(limits_sentence({"limits": rows, "causes": [{}]})).startswith("If these causes are right, all joints")
     assert limits_sentence({"limits": []}) is None
+
+
+def test_a_sentence_names_the_first_joints_and_how_many_more_there_are() -> None:
+    assert list_first(["a", "b", "c"]) == "a, b, c"
+    assert list_first(["a", "b", "c", "d"]) == "a, b, c, and 1 joint more: see the calibration"
+    assert list_first(["a", "b", "c", "d", "e"]) == "a, b, c, and 2 joints more: see the calibration"
 
 
 def test_a_rotor_that_is_as_light_as_it_can_be_is_out_of_family() -> None:

@@ -24,29 +24,29 @@ def part(count: int) -> Log:
     return cut_log(replace(whole, episodes=whole.episodes[:count], metadata=labels), arm())
 
 
-def mapped(one: Log, z: np.ndarray) -> list[Cell]:
-    return cells(one, z, find_regimes(one, nominal(arm())))
+def mapped(log: Log, z: np.ndarray) -> list[Cell]:
+    return cells(log, z, find_regimes(log, nominal(arm())))
 
 
 @pytest.mark.parametrize("count", [1, 2, 9])
 def test_noise_names_hardly_a_cell_however_few_the_trajectories(count: int) -> None:
-    one, rng = part(count), np.random.default_rng(0)
-    shape = (len(one.pieces), one.pieces.real.shape[1] - one.pieces.warm_up, 2)
-    named = [cell.named for _ in range(20) for cell in mapped(one, rng.standard_normal(shape))]
+    log, rng = part(count), np.random.default_rng(0)
+    shape = (len(log.pieces), log.pieces.real.shape[1] - log.pieces.warm_up, 2)
+    named = [cell.named for _ in range(20) for cell in mapped(log, rng.standard_normal(shape))]
     assert np.mean(named) < 0.02
 
 
 def test_a_joint_that_shakes_is_told_as_large_as_it_is_and_in_no_regime() -> None:
     calm = part(9)
-    one = replace(calm, comparison=replace(calm.comparison, shaking=np.array([True, False])))
-    scored = one.pieces.real.shape[1] - one.pieces.warm_up
-    z = 2.0 * np.ones((len(one.pieces), scored, 2))
-    z[:, one.comparison.used(scored)[0] :, 0] = 0.0
-    found_cells = mapped(one, z)
+    log = replace(calm, comparison=replace(calm.comparison, shaking=np.array([True, False])))
+    scored = log.pieces.real.shape[1] - log.pieces.warm_up
+    z = 2.0 * np.ones((len(log.pieces), scored, 2))
+    z[:, log.comparison.count_residuals(scored)[0] :, 0] = 0.0
+    found_cells = mapped(log, z)
     everywhere = {cell.joint: cell for cell in found_cells if cell.regime == "all"}
-    assert [everywhere[joint].rms for joint in one.joints] == pytest.approx([2.0, 2.0])
-    assert [everywhere[joint].share for joint in one.joints] == pytest.approx([0.5, 0.5])
-    assert {cell.regime for cell in found_cells if cell.joint == one.joints[0] and cell.share > 0.0} == {"all"}
+    assert [everywhere[joint].rms for joint in log.joints] == pytest.approx([2.0, 2.0])
+    assert [everywhere[joint].share for joint in log.joints] == pytest.approx([0.5, 0.5])
+    assert {cell.regime for cell in found_cells if cell.joint == log.joints[0] and cell.share > 0.0} == {"all"}
 
 
 def test_intervals_of_one_held_out_trajectory_have_a_width() -> None:
@@ -60,17 +60,23 @@ def test_intervals_of_one_held_out_trajectory_have_a_width() -> None:
 
 def test_a_joint_that_is_stuck_is_told_first() -> None:
     whole = log({})
-    still = tuple(replace(one, position=one.position * [1.0, 0.0]) for one in whole.episodes)
+    still = tuple(replace(episode, position=episode.position * [1.0, 0.0]) for episode in whole.episodes)
     result = diagnose(replace(whole, episodes=still), nominal(arm()), 0.002, FEW, lambda phase: None)
-    (said,) = [one for one in document(result)["caveats"] if "do not" in one]
+    (said,) = [caveat for caveat in document(result)["caveats"] if "do not" in caveat]
     assert "elbow" in said and "shoulder" not in said
 
 
 def test_a_log_without_a_whole_window_is_refused() -> None:
     whole = log({})
     short = tuple(
-        replace(one, time=one.time[:30], action=one.action[:29], position=one.position[:30], velocity=one.velocity[:30])
-        for one in whole.episodes
+        replace(
+            episode,
+            time=episode.time[:30],
+            action=episode.action[:29],
+            position=episode.position[:30],
+            velocity=episode.velocity[:30],
+        )
+        for episode in whole.episodes
     )
     with pytest.raises(GslError, match="no trajectory lasts 1 s"):
         cut_log(Batch(short, whole.joints, whole.control_period, whole.metadata), arm())

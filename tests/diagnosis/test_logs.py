@@ -70,8 +70,8 @@ def test_a_good_log_passes() -> None:
 def test_a_bad_log_is_one_clear_line(bad: Batch, words: str) -> None:
     with pytest.raises(GslError) as caught:
         check_log(bad, NAO, "my_log.parquet")
-    told = str(caught.value)
-    assert told.startswith("my_log.parquet: ") and words in told and "\n" not in told
+    message = str(caught.value)
+    assert message.startswith("my_log.parquet: ") and words in message and "\n" not in message
 
 
 def test_a_hole_in_time_is_refused() -> None:

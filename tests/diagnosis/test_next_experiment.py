@@ -116,8 +116,8 @@ def test_playing_the_next_experiment_answers_the_question(truth: str) -> None:
 
 
 def test_nothing_speaks_against_the_truth_and_little_against_what_calibration_takes_up() -> None:
-    found = played({"command_latency": {"delay": 0.012}}, swings(0.25, 0.0, 0.25), without=but(*LAGS))
-    rehearsal, question = Rehearsal.of(found, choices()), find_rivals(found)[0]
+    findings = played({"command_latency": {"delay": 0.012}}, swings(0.25, 0.0, 0.25), without=but(*LAGS))
+    rehearsal, question = Rehearsal.of(findings, choices()), find_rivals(findings)[0]
     itself = (question.truth,)
     assert (rehearsal.log_odds(question.truth, itself) == 0.0).all()
     rows = len(calibration.SPREADS)
@@ -133,27 +133,27 @@ def test_one_load_does_not_show_friction_that_depends_on_it() -> None:
     pair = ("load_friction", "coulomb_friction")
     alone = played({}, swings(0.01, 0.3, 0.5), without=some)
     assert alone.verdict.word == "no_gap"
-    assert pair in [one.names for one in find_hidden(alone)] and ("torque_limit", NOTHING) in [
-        one.names for one in find_hidden(alone)
+    assert pair in [pair.names for pair in find_hidden(alone)] and ("torque_limit", NOTHING) in [
+        hidden.names for hidden in find_hidden(alone)
     ]
     wanted = next_experiment(alone, choices())
     assert wanted is not None and pair in wanted.separates
-    assert pair not in [one.names for one in find_hidden(played({}, whole(), without=some))]
+    assert pair not in [hidden.names for hidden in find_hidden(played({}, whole(), without=some))]
 
 
 def test_a_log_that_shows_all_that_a_motion_can_leaves_nothing_to_play() -> None:
-    found = played({}, whole(), without=but("command_latency", "coulomb_friction", "load_friction", "encoder_noise"))
-    assert found.verdict.word == "no_gap" and next_experiment(found, choices()) is None
+    findings = played({}, whole(), without=but("command_latency", "coulomb_friction", "load_friction", "encoder_noise"))
+    assert findings.verdict.word == "no_gap" and next_experiment(findings, choices()) is None
 
 
 def test_a_stop_that_nothing_hints_at_is_no_question() -> None:
-    found = played({}, swings(0.01, 0.3, 0.5), without=but("torque_limit", "joint_limit"))
-    assert [one.names[0] for one in find_hidden(found)] == ["torque_limit"]
+    findings = played({}, swings(0.01, 0.3, 0.5), without=but("torque_limit", "joint_limit"))
+    assert [hidden.names[0] for hidden in find_hidden(findings)] == ["torque_limit"]
 
 
 def test_what_is_alike_in_the_air_by_nature_wants_feet_on_the_ground() -> None:
-    found = played({"zero_offset": {"offset": 0.03}}, whole(), without=but("zero_offset", "sensor_bias"))
-    wanted = next_experiment(found, choices())
+    findings = played({"zero_offset": {"offset": 0.03}}, whole(), without=but("zero_offset", "sensor_bias"))
+    wanted = next_experiment(findings, choices())
     assert wanted is not None and wanted.separates == (("sensor_bias", "zero_offset"),)
     assert wanted.episodes == () and "ground" in wanted.excitation
 

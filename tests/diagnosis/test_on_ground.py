@@ -34,11 +34,11 @@ def test_a_bias_of_the_encoders_moves_the_log_and_not_the_robot(walk: Log) -> No
     simulator = Walking(plant(), 0.002, 0.02)
     biased = replace(walk.pieces, windows=walk.pieces.windows._replace(motion=walk.pieces.windows.motion.copy()))
     biased.windows.motion[:, 0] += 0.03
-    told = simulator.simulate({"sensor_bias": {"bias": 0.03}}, NONE, biased)
+    replayed = simulator.simulate({"sensor_bias": {"bias": 0.03}}, NONE, biased)
     joints = len(walk.joints)
     expected = simulator.simulate({}, NONE, walk.pieces)
-    assert np.allclose(told[..., :joints] - 0.03, expected[..., :joints], atol=1e-9)
-    assert np.allclose(told[..., joints:], expected[..., joints:], atol=1e-9)
+    assert np.allclose(replayed[..., :joints] - 0.03, expected[..., :joints], atol=1e-9)
+    assert np.allclose(replayed[..., joints:], expected[..., joints:], atol=1e-9)
 
 
 def test_late_encoders_tell_of_where_joints_were() -> None:
@@ -80,9 +80,9 @@ def test_robots_of_one_make_are_apart_by_more_in_the_joints_that_carry(walk: Log
 
 
 def test_a_stiffness_that_ranges_over_several_sizes_is_stepped_in_logarithms() -> None:
-    found = {one.effect: one for one in library(nao(), floating=True)}
-    assert found["ground_compliance"].ratios.all()
-    assert not found["command_latency"].ratios.any() and not found["stribeck_friction"].ratios.any()
+    candidates = {candidate.effect: candidate for candidate in library(nao(), floating=True)}
+    assert candidates["ground_compliance"].ratios.all()
+    assert not candidates["command_latency"].ratios.any() and not candidates["stribeck_friction"].ratios.any()
 
 
 def test_a_torque_beside_the_targets_does_what_a_shift_of_the_targets_does(walk: Log) -> None:

@@ -70,8 +70,8 @@ def test_a_replay_leaves_noise_where_it_sends_what_was_sent() -> None:
     batch = log({})
     assert residual(batch) < 1.3
     for group in GROUPS:
-        sensors = [{key: row for key, row in one.sensors.items() if group not in key} for one in batch.episodes]
-        lacking = [replace(one, sensors=left) for one, left in zip(batch.episodes, sensors, strict=True)]
+        sensors = [{key: row for key, row in episode.sensors.items() if group not in key} for episode in batch.episodes]
+        lacking = [replace(episode, sensors=left) for episode, left in zip(batch.episodes, sensors, strict=True)]
         assert residual(replace(batch, episodes=tuple(lacking))) > 5.0, group
 
 
@@ -97,15 +97,15 @@ def columns(kp: np.ndarray, kd: np.ndarray) -> list[Mapping[str, np.ndarray]]:
 
 @pytest.mark.parametrize("gains", [(2.0 * KP, 0.5 * KD), (0.0, KD)])
 def test_the_servos_get_the_gains_of_the_log(gains: tuple[float, float]) -> None:
-    told = columns(*(np.full(9, gain) for gain in gains))
-    sim = with_logged_gains(SIM, told, "log")
+    logged = columns(*(np.full(9, gain) for gain in gains))
+    sim = with_logged_gains(SIM, logged, "log")
     np.testing.assert_allclose([sim.plant.servo.kp[0], sim.plant.servo.kd[0]], gains)
-    assert with_logged_gains(sim, told, "log") is sim
+    assert with_logged_gains(sim, logged, "log") is sim
 
 
 def test_a_log_without_gains_or_with_those_of_the_simulator_changes_nothing() -> None:
-    for told in ([{}], columns(np.full(9, KP), np.full(9, KD))):
-        assert with_logged_gains(SIM, told, "log") is SIM
+    for logged in ([{}], columns(np.full(9, KP), np.full(9, KD))):
+        assert with_logged_gains(SIM, logged, "log") is SIM
 
 
 def test_gains_that_vary_are_sent_as_shares_of_the_robots_own_whatever_the_simulator_has() -> None:

@@ -38,7 +38,7 @@ def with_channels(batch: Batch, channels: Mapping[str, Any]) -> Batch:
 
 def claim(effect: str, values: list[float], free: tuple[str, ...]) -> Hypothesis:
     """A hypothesis with fitted values, its fit left out."""
-    candidate = next(one for one in library(arm()) if one.effect == effect and one.free == free)
+    candidate = next(entry for entry in library(arm()) if entry.effect == effect and entry.free == free)
     fit = Fit(np.array(values), no_shifts(2), 0.0, 0.0, np.eye(len(values)))
     return Hypothesis((candidate,), (np.array(values),), fit, np.zeros(1), np.ones(1), np.ones(2))
 
@@ -123,7 +123,7 @@ def test_what_is_dropped_leaves_the_others_within_their_ranges() -> None:
         claim("stribeck_friction", [0.2, 0.1], ("torque", "velocity")),
         claim("load_friction", [0.2], ("coefficient",)),
     )
-    stiction, load = (replace(one, costs=np.full(8, 30.0), counts=np.ones(8)) for one in parts)
+    stiction, load = (replace(part, costs=np.full(8, 30.0), counts=np.ones(8)) for part in parts)
     beyond = replace(stiction, parameters=(np.array([0.5, 0.1]),), costs=np.full(8, 29.0))
     both = replace(
         load, candidates=stiction.candidates + load.candidates, parameters=stiction.parameters + load.parameters

@@ -27,17 +27,21 @@ NONE = replace(EMPTY, candidates=(), parameters=(), costs=np.full(8, 1100.0), co
 
 
 def friction(joints: str, cost: float) -> Hypothesis:
-    one = claim("coulomb_friction", [0.1], ("torque",))
-    return replace(one, candidates=(one.candidates[0].on(joints),), costs=np.full(8, cost), counts=PER_SAMPLE)
+    everywhere = claim("coulomb_friction", [0.1], ("torque",))
+    return replace(
+        everywhere, candidates=(everywhere.candidates[0].on(joints),), costs=np.full(8, cost), counts=PER_SAMPLE
+    )
 
 
-def with_both(one: Hypothesis, other: Hypothesis, cost: float) -> Hypothesis:
-    parts = {"candidates": one.candidates + other.candidates, "parameters": one.parameters + other.parameters}
-    return replace(one, costs=np.full(8, cost), **cast(Any, parts))
+def with_both(first: Hypothesis, other: Hypothesis, cost: float) -> Hypothesis:
+    parts = {"candidates": first.candidates + other.candidates, "parameters": first.parameters + other.parameters}
+    return replace(first, costs=np.full(8, cost), **cast(Any, parts))
 
 
 def selection(chosen: Hypothesis, *others: Hypothesis) -> Selection:
-    return Selection(NONE, chosen, tuple(sorted([NONE, chosen, *others], key=lambda one: one.cost)), cast(Any, None))
+    return Selection(
+        NONE, chosen, tuple(sorted([NONE, chosen, *others], key=lambda hypothesis: hypothesis.cost)), cast(Any, None)
+    )
 
 
 def test_two_causes_of_one_effect_are_each_judged_against_the_other_alone() -> None:
@@ -52,13 +56,13 @@ def test_two_causes_of_one_effect_are_each_judged_against_the_other_alone() -> N
 def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
     shoulder, elbow = friction("shoulder", 300.0), friction("elbow", 900.0)
     alone = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow))
-    assert [one.rival for one in alone.causes] == [None, None]
-    assert max(one.probability for one in alone.causes) <= VerdictSettings.unrivalled
+    assert [cause.rival for cause in alone.causes] == [None, None]
+    assert max(cause.probability for cause in alone.causes) <= VerdictSettings.unrivalled
     load = replace(claim("load_friction", [0.2], ("coefficient",)), costs=np.full(8, 900.0), counts=PER_SAMPLE)
     rivals = with_both(shoulder, load, 200.0), with_both(elbow, load, 200.0)
     tried = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, *rivals))
-    assert [one.rival for one in tried.causes] == ["load_friction", "load_friction"]
-    assert min(one.probability for one in tried.causes) > VerdictSettings.unrivalled
+    assert [cause.rival for cause in tried.causes] == ["load_friction", "load_friction"]
+    assert min(cause.probability for cause in tried.causes) > VerdictSettings.unrivalled
 
 
 def test_a_spurious_effect_that_is_cheapest_and_fails_hides_no_other() -> None:
@@ -74,7 +78,7 @@ def test_a_spurious_effect_that_is_cheapest_and_fails_hides_no_other() -> None:
     assert Judge(1.0).judge(tried).word == "inseparable"
     verdict = Judge(1.0).judge(replace(tried, rejected=(spurious,)))
     assert (verdict.word, verdict.causes[0].rival) == ("causes", None)
-    assert replace(tried, rejected=(spurious,)).objection(spurious) == "not surely better than a calibration"
+    assert replace(tried, rejected=(spurious,)).objection(spurious) == "not significantly better than a calibration"
 
 
 @pytest.mark.parametrize(
@@ -98,7 +102,7 @@ def test_where_a_calibration_leaves_no_more_than_noise_there_is_nothing_to_expla
     [
         (np.full(8, 110.0), 0.1, None),
         (np.full(8, 90.0), 0.1, "little gain for another effect"),
-        (np.array([0.0] * 4 + [150.0] * 4), 0.1, "not surely better"),
+        (np.array([0.0] * 4 + [150.0] * 4), 0.1, "not significantly better"),
         (np.full(8, 50.0), 50.0, "a value beyond its documented range"),
     ],
 )

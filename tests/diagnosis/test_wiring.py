@@ -34,10 +34,10 @@ def logged(commands: Sequence[np.ndarray] = PLAN.commands, effects: Mapping[str,
     rng = np.random.default_rng(5)
     robot = jitter(nominal(arm()), rng)
     episodes = []
-    played = play_same(robot, effects or {}, None, commands, [one[0] for one in commands], PERIOD)
-    for asked, told in zip(commands, played, strict=True):
-        position = told + 1.5e-3 * rng.standard_normal(told.shape)
-        episodes.append(Trajectory(PERIOD * np.arange(len(told)), asked, position, slope(position, PERIOD)))
+    played = play_same(robot, effects or {}, None, commands, [path[0] for path in commands], PERIOD)
+    for asked, path in zip(commands, played, strict=True):
+        position = path + 1.5e-3 * rng.standard_normal(path.shape)
+        episodes.append(Trajectory(PERIOD * np.arange(len(path)), asked, position, slope(position, PERIOD)))
     names = [{"policy": name} for name in PLAN.names]
     return Batch(tuple(episodes), robot.robot.controlled, PERIOD, {"episodes": names})
 
@@ -49,9 +49,11 @@ def audited(log: Batch, plant: Plant | None = None) -> Audit:
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_fault_is_named_with_its_joints(kind: str) -> None:
     case = wire(kind, PLAN.commands, logged, nominal(arm()), np.random.default_rng(3))
-    found = audited(case.log, case.plant)
-    assert found.verdict == "wiring" and found.spoils
-    named = {joint for one in found.document()["findings"] if one["kind"] == kind for joint in one["joints"]}
+    audit = audited(case.log, case.plant)
+    assert audit.verdict == "wiring" and audit.spoils
+    named = {
+        joint for finding in audit.document()["findings"] if finding["kind"] == kind for joint in finding["joints"]
+    }
     assert named == set(case.joints)
 
 
@@ -69,12 +71,12 @@ def test_a_fault_is_named_with_its_joints(kind: str) -> None:
     ids=lambda effects: "_".join(effects) or "nothing",
 )  # fmt: skip
 def test_physics_is_no_wiring(effects: Mapping[str, Any]) -> None:
-    found = audited(logged(effects=effects))
-    assert (found.verdict, found.document()["findings"]) == ("clean", [])
+    audit = audited(logged(effects=effects))
+    assert (audit.verdict, audit.document()["findings"]) == ("clean", [])
 
 
 def test_commands_that_are_nearly_equal_are_no_exchange() -> None:
-    alike = [np.column_stack([one[:, 0], one[:, 0] + 0.01]) for one in PLAN.commands]
+    alike = [np.column_stack([path[:, 0], path[:, 0] + 0.01]) for path in PLAN.commands]
     log = logged(alike)
     assert (relate(log.episodes, PERIOD).source == [0, 1]).all()
     assert audited(log).verdict == "clean"
@@ -83,18 +85,18 @@ def test_commands_that_are_nearly_equal_are_no_exchange() -> None:
 def test_a_row_late_is_as_well_a_latency_and_is_said_to_be() -> None:
     log = logged(effects={"command_latency": {"delay": PERIOD}})
     late = change(logged(), action=lambda x: np.vstack([x[1:], x[-1:]]))
-    for one in (log, late):
-        found = audited(one)
-        assert found.verdict == "unclear" and not found.spoils
-        assert "latency of 20 ms" in found.summary
+    for logged_again in (log, late):
+        audit = audited(logged_again)
+        assert audit.verdict == "unclear" and not audit.spoils
+        assert "latency of 20 ms" in audit.summary
 
 
 def test_two_faults_are_both_named() -> None:
     log = change(logged(), position=lambda x: x * [1.0, -1.0], action=lambda x: np.vstack([x[:1], x[:-1]]))
-    assert {one["kind"] for one in audited(log).document()["findings"]} == {"sign", "shift"}
+    assert {finding["kind"] for finding in audited(log).document()["findings"]} == {"sign", "shift"}
 
 
 def test_the_order_of_the_joints_in_the_log_changes_nothing() -> None:
     log = change(logged(), position=lambda x: x * [1.0, -1.0])
     turned = log.only(tuple(reversed(log.joints)))
-    assert [one["joints"] for one in audited(turned).document()["findings"]] == [["elbow"]]
+    assert [finding["joints"] for finding in audited(turned).document()["findings"]] == [["elbow"]]

@@ -34,19 +34,19 @@ def bent() -> Findings:
 
 def test_gravitys_torque_is_what_makes_a_servo_droop() -> None:
     plant, pose = nominal(arm()), np.array([0.9, 0.6])
-    told = Held.of(plant, 0.002, PERIOD).play([np.repeat(pose[None], 100, axis=0)], [pose], 1)[0][-1]
-    torque = gravity_torque(plant.robot, dict(zip(plant.robot.motors, told.tolist(), strict=True)), plant.gravity)
-    np.testing.assert_allclose(pose - told, torque / plant.servo.kp, rtol=1e-3)
+    position = Held.of(plant, 0.002, PERIOD).play([np.repeat(pose[None], 100, axis=0)], [pose], 1)[0][-1]
+    torque = gravity_torque(plant.robot, dict(zip(plant.robot.motors, position.tolist(), strict=True)), plant.gravity)
+    np.testing.assert_allclose(pose - position, torque / plant.servo.kp, rtol=1e-3)
     assert abs(torque[0]) > 0.1
 
 
 def test_a_zero_in_a_log_of_one_pose_may_be_a_load(bent: Findings) -> None:
-    (found,) = find_droops(bent)
-    assert found.joint == "shoulder" and found.told
-    assert abs(found.zero) == pytest.approx(0.014, abs=0.006)
-    assert 0.0 < found.wrong <= 1.0
-    told = " ".join(document(bent)["caveats"])
-    assert "a shifted zero and another droop under gravity" in told and "shoulder" in told
+    (droop,) = find_droops(bent)
+    assert droop.joint == "shoulder" and droop.separable
+    assert abs(droop.zero) == pytest.approx(0.014, abs=0.006)
+    assert 0.0 < droop.wrong <= 1.0
+    caveats = " ".join(document(bent)["caveats"])
+    assert "a shifted zero and another droop under gravity" in caveats and "shoulder" in caveats
 
 
 def test_the_ladder_that_tells_them_apart_keeps_the_limits(bent: Findings) -> None:
@@ -71,20 +71,20 @@ def test_after_the_ladder_nothing_is_left_to_tell(bent: Findings) -> None:
 def test_a_log_with_the_base_turned_round_tells(bent: Findings) -> None:
     """Half of the windows are said to hang the other way round; what gravity did there is then part of the answer."""
     pieces, turned = bent.log.pieces, {"gravity_tilt": {"pitch": 3.14}}
-    known = replace(pieces, conditions=tuple(({}, turned)[k % 2] for k in range(len(bent.log.records))))
-    assert find_droops(replace(bent, log=replace(bent.log, pieces=known))) == ()
+    turned_pieces = replace(pieces, conditions=tuple(({}, turned)[k % 2] for k in range(len(bent.log.records))))
+    assert find_droops(replace(bent, log=replace(bent.log, pieces=turned_pieces))) == ()
 
 
 def test_a_zero_that_is_named_is_one_as_well() -> None:
     """Where the library explains it, an offset in the servo or in the log is still no load for sure."""
     named = played(OFF, swings(0.08, 0.9, 1.2), without=LEFT_OUT[2:])
     off = replace(named.answer.fit, shifts=calibration.no_shifts(2))
-    candidate = next(one for one in named.problem.library if one.effect in ("zero_offset", "sensor_bias"))
+    candidate = next(entry for entry in named.problem.library if entry.effect in ("zero_offset", "sensor_bias"))
     cause = named.problem.fit((candidate,), np.array([0.014]), calibration.no_shifts(2))
     chosen = replace(cause, fit=off)
     verdict = replace(named.verdict, word="inseparable")
-    found = replace(named, selection=replace(named.selection, chosen=chosen), verdict=verdict)
-    assert [one.joint for one in find_droops(found)] == ["shoulder"]
+    offset = replace(named, selection=replace(named.selection, chosen=chosen), verdict=verdict)
+    assert [droop.joint for droop in find_droops(offset)] == ["shoulder"]
 
 
 def test_a_log_of_many_poses_shows_a_zero_as_what_it_is() -> None:

@@ -9,8 +9,9 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from pages import FENCE, GUIDES, LINK, RESULTS, ROOT, SHELLS, anchors, sentences, words
+from pages import FENCE, GUIDES, LINK, RESULTS, ROOT, SHELLS, WRITTEN, anchors, sentences, words
 
+MOST = 13_500  # words of prose on all pages; whoever needs more first looks for what can go (count_words.py)
 LONGEST = 25  # words of a sentence
 FIGURES = 2  # numbers in a sentence; more belong in a table
 NUMBER = re.compile(r"(?<![\w.-])-?\d[\d.,]*")
@@ -21,11 +22,24 @@ def name(page: Path) -> str:
     return page.relative_to(ROOT).as_posix()
 
 
+def test_the_pages_together_stay_short() -> None:
+    """Without tables, code and headings, and without the tables that studies write."""
+    assert sum(len(words(line)) for page in WRITTEN for line in sentences(page.read_text("utf-8"))) <= MOST
+
+
+def test_prose_has_no_mark_of_an_item_and_no_table_in_it() -> None:
+    text = "# A title\n\nOne **word** and\na link to π0. [Two](x.md)\nwords.\n\n| a | b |\n\n- An item - with `a b`.\n"
+    assert list(sentences(text)) == ["One **word** and a link to π0.", "Two words.", "An item - with CODE."]
+
+
+@pytest.mark.parametrize("page", WRITTEN, ids=name)
+def test_a_sentence_is_short(page: Path) -> None:
+    assert [line for line in sentences(page.read_text("utf-8")) if len(words(line)) > LONGEST] == []
+
+
 @pytest.mark.parametrize("page", GUIDES, ids=name)
-def test_a_sentence_is_short_and_has_few_figures(page: Path) -> None:
-    said = list(sentences(page.read_text("utf-8")))
-    assert [line for line in said if len(words(line)) > LONGEST] == []
-    assert [line for line in said if len(NUMBER.findall(line)) > FIGURES] == []
+def test_a_sentence_has_few_figures(page: Path) -> None:
+    assert [line for line in sentences(page.read_text("utf-8")) if len(NUMBER.findall(line)) > FIGURES] == []
 
 
 @pytest.mark.parametrize("page", GUIDES, ids=name)

@@ -21,19 +21,6 @@ IRREGULAR = {
 VERBS = {"embed", "exceed", "feed", "need", "proceed", "seed", "speed"}  # that end like participles and are none
 PUBLIC = {"grounded_env"}  # `gsl.grounded_env(...)` is written in notebooks of users
 CONTRACT = {("gsl/errors.py", "given")}  # an error's attribute, which a user's own component may set
-UNFINISHED = (  # an entry goes once its names are mended
-    "gsl/commandline",
-    "gsl/core/lanes.py",
-    "gsl/diagnosis",
-    "gsl/storage",
-    "gsl/training/adjoint.py",
-    "gsl/training/replay_path.py",
-    "gsl/worlds/held.py",
-    "gsl/worlds/servo.py",
-    "tests/commandline",
-    "tests/diagnosis",
-    "tests/storage",
-)
 
 
 def name_of(path: Path) -> str:
@@ -43,10 +30,6 @@ def name_of(path: Path) -> str:
 def files(*places: str) -> Iterator[Path]:
     for place in places:
         yield from sorted((PLOT / place).rglob("*.py")) or [PLOT / place]
-
-
-def is_unfinished(path: Path) -> bool:
-    return any(name_of(path) == place or name_of(path).startswith(f"{place}/") for place in UNFINISHED)
 
 
 def fillers(path: Path) -> list[str]:
@@ -73,16 +56,11 @@ def is_participle(word: str) -> bool:
 
 
 def test_a_variable_says_what_it_is() -> None:
-    wrong = {name_of(path): names for path in files(*ROOMS) if not is_unfinished(path) and (names := fillers(path))}
+    wrong = {name_of(path): names for path in files(*ROOMS) if (names := fillers(path))}
     assert wrong == {}
 
 
 def test_a_function_is_a_verb() -> None:
     places = files("gsl", "experiments", "benchmarks")
-    wrong = {name_of(path): names for path in places if not is_unfinished(path) and (names := participles(path))}
+    wrong = {name_of(path): names for path in places if (names := participles(path))}
     assert wrong == {}
-
-
-@pytest.mark.parametrize("place", UNFINISHED)
-def test_what_is_mended_is_no_exception_any_more(place: str) -> None:
-    assert any(fillers(path) or participles(path) for path in files(place))

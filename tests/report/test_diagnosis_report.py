@@ -73,7 +73,7 @@ def test_the_first_screen_answers_everything() -> None:
     first = words(report_html(made.document())).split("Caveats")[0]
     assert "2 causes found: servo gain of LKneePitch and command latency of all joints" in first
     assert "In 3 of 14 joints: LKneePitch 60 % of the excess (most when fast, " in first
-    assert " ×), LHipRoll 22 % and LHipPitch 8 %. The others are not surely beyond the noise." in first
+    assert " ×), LHipRoll 22 % and LHipPitch 8 %. The others are not significantly beyond the noise." in first
     assert "kp 0.57 (0.55 to 0.60)" in first and "delay 31.2 ms (29.0 to 33.5 ms)" in first
     assert "97 % sure, 81 % of what a calibration leaves comes back without it (70 to 90 %)" in first
     assert "From 3.20 × to 1.05 × the noise floor on held-out records: 98 % of the excess is gone (95 to 99 %)" in first
@@ -291,13 +291,13 @@ def test_where_speaks_of_regimes_if_no_joint_stands_out_as_a_whole() -> None:
     hip = {"joint": "Hip", "regime": "all", "share": 0.01, "named": False}
     sentence = where_sentence({"where": [cell, whole, hip]})
     assert sentence == (
-        "No joint stands out as a whole. Surely beyond the noise only at times: Knee when asked for much torque, "
-        "5.20 ×. The others are not surely beyond the noise."
+        "No joint stands out as a whole. Significantly beyond the noise only at times: Knee when asked for much "
+        "torque, 5.20 ×. The others are not significantly beyond the noise."
     )
     beside = where_sentence({"where": [cell, whole, {**hip, "share": 0.6, "rms": 3.0, "named": True}]})
     assert beside == (
-        "In 1 of 2 joints: Hip 60 % of the excess. Surely beyond the noise only at times: Knee when asked for much "
-        "torque, 5.20 ×."
+        "In 1 of 2 joints: Hip 60 % of the excess. Significantly beyond the noise only at times: Knee when asked for "
+        "much torque, 5.20 ×."
     )
 
 
@@ -310,9 +310,11 @@ def test_a_place_is_told_with_the_figures_of_the_whole_joint() -> None:
 
 def test_an_explanation_that_costs_less_says_why_it_is_not_the_verdict() -> None:
     hypothesis = {"effects": ["backlash"], "scopes": ["all"], "gain": {"value": 0.9}, "behind": -300.0}
-    text = words(report_html({"ranking": [{**hypothesis, "passed_over": "not surely better"}], "least_gain": 2800.0}))
+    text = words(
+        report_html({"ranking": [{**hypothesis, "passed_over": "not significantly better"}], "least_gain": 2800.0})
+    )
     assert (
-        "backlash of all joints 90 % −300 passed over: not surely better" in text
+        "backlash of all joints 90 % −300 passed over: not significantly better" in text
         and "has to save 2,800 over calibration alone" in text
     )
 

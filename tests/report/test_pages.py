@@ -15,17 +15,22 @@ from browser import CUT_OR_COVERED, PHONE, browser, check_seen
 from page_reader import Page, check_alone, words
 
 from gsl.core.unit import Unit
+from gsl.report.account import evaluation_table
 from gsl.report.charts import Bar, Curve, Dot, Pair, Span, bar_chart, dot_chart, line_chart, scatter
+from gsl.report.console import Console
 from gsl.report.evaluation_page import write_evaluation_page
 from gsl.report.footfalls import Walk, footfall_figure
 from gsl.report.iteration_page import grounding
 from gsl.report.joint_trace import Traces
 from gsl.report.learning_curve import search
 from gsl.report.markdown import table as markdown
-from gsl.report.parts import element, join, prose, table
+from gsl.report.parts import element, join, prose, section, table
 from gsl.report.run_page import Answer, Change, curves, footfalls, joints, parameters, write_page
 from gsl.report.study_page import write_study_page
 from gsl.report.style import COLOURS, curve_figure, look
+from gsl.rollout.promise import promise
+from gsl.storage.artifact import build
+from gsl.storage.policies import PolicyRecord
 
 HOSTILE = "<script>alert(1)</script>\"' onload='x' $\\frac{"
 TIME = np.arange(0.0, 0.8, 0.02)
@@ -64,7 +69,7 @@ def test_an_evaluation_says_its_gain_with_its_interval_and_shows_what_the_table_
     assert "generation_02 5.0 1 of 3" in said and "generation_01, fresh 21.0 20.0 to 22.0 0 of 3" in said
     assert "step 0.2 0.25 +0.50" in said and "swing 1 0.9 −0.20" in said
     assert "episodes to choose 9 episodes to check 3 fresh episodes to report 6 in all 18" in said
-    assert "fell in real" in said  # marked in the learning curve
+    assert "fell on the real side" in said  # marked in the learning curve
 
 
 def test_a_gain_that_may_be_none_is_called_so(tmp_path: Path) -> None:
@@ -72,6 +77,53 @@ def test_a_gain_that_may_be_none_is_called_so(tmp_path: Path) -> None:
     text = written(tmp_path, unsure)
     assert "is not significant" in words(text) and Page(text).classes()["doubt"] == 1
     assert Page(written(tmp_path)).classes()["good"] == 1
+
+
+def test_a_promise_that_was_not_kept_is_on_the_page_as_in_the_terminal(tmp_path: Path) -> None:
+    kept, broken = (promise_of(tmp_path / name, value) for name, value in (("kept", 0.21), ("broken", 0.3)))
+    assert kept["warning"] == "" and broken["warning"].startswith("the search promised 30.0 cm/s (generation_01), but")
+    said = words(written(tmp_path, {**METRICS, "promise": broken}))
+    assert f"T{broken['warning'][1:]}." in said
+    assert "promised" not in words(written(tmp_path, {**METRICS, "promise": kept}))
+
+
+def promise_of(place: Path, value: float) -> dict[str, Any]:
+    policies = [PolicyRecord("pi0", {}), PolicyRecord("generation_01", {}, generation=1, value_sim=value)]
+    promised = promise(policies, 1, BEST, UNIT)
+    assert promised is not None
+    return promised
+
+
+def test_every_warning_of_a_terminal_is_on_the_page_once(tmp_path: Path) -> None:
+    class Warned:
+        kind = "evaluate"
+
+        def parents(self) -> dict[str, Path]:
+            return {}
+
+        def run(self, folder: Path, console: Console) -> dict[str, Any]:
+            console.status("warning: the log says `kp` < 3")
+            console.status("nothing of weight")
+            console.status("warning: 5 % of it is shown")
+            part = section("Seen", element("p", prose("5 % of it is shown.")))
+            write_page(folder, Answer("Is it?", "It is.", sure=True), [part])
+            return {}
+
+    made = build(Warned(), config={}, out=tmp_path / "a", command="gsl a", force=False, console=Console())
+    text = (made.folder / "report.html").read_text("utf-8")
+    assert "Warnings The log says kp < 3. Seen" in words(text) and "<code>kp</code> &lt; 3" in text
+    assert words(text).replace("\u00a0", " ").count("5 % of it is shown") == 1 and "weight" not in words(text)
+
+
+def test_a_column_that_says_the_value_again_is_left_out(tmp_path: Path) -> None:
+    def rows(**outcome: float) -> list[str]:
+        policies = [{**row, "outcome": {name: row["value"] * factor for name, factor in outcome.items()}}
+                    for row in DOCUMENT["policies"]]  # fmt: skip
+        return list(evaluation_table({**DOCUMENT, "policies": policies, "check": [], "confirmation": []}, UNIT)[0])
+
+    plain = ["policy", "in simulation [cm/s]", "on the real side [cm/s]", "95 % interval", "falls"]
+    assert rows(**{"speed [cm/s]": 100.0}) == plain
+    assert rows(**{"speed [cm/s]": 100.0, "distance [m]": 15.0}) == [*plain, "distance [m]"]
 
 
 def test_equal_runs_write_equal_pages_that_need_nothing_else(tmp_path: Path) -> None:

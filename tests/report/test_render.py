@@ -11,12 +11,13 @@ from PIL import Image
 
 from gsl.cli import call
 from gsl.commandline.robot_files import write_robot
+from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError, InputError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.walk_engine import WalkEngine
 from gsl.report.console import Console
 from gsl.report.film import RATE, SHEET, WIDTH, Shot, check_format, film
-from gsl.report.film_traces import HEIGHT
+from gsl.report.film_traces import HEIGHT, draw_traces, shorten
 from gsl.report.render import portrait
 from gsl.robots.nao import nao
 from gsl.rollout.rollout import Scenario, rollout
@@ -157,3 +158,20 @@ def test_render_refuses_in_one_line(
     line = capsys.readouterr().err.strip().splitlines()[-1]
     assert problem in line
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("width", [320, 700])
+@pytest.mark.parametrize("name", ["rise", "panda_finger_joint1", "left_gripper_parallel_slider_joint"])
+def test_a_name_of_a_joint_that_slides_fits_into_the_strip(name: str, width: int) -> None:
+    time = np.linspace(0.0, 3.0, 150)
+    way = 0.9 * np.sin(3.0 * time)[:, None]
+    shot = Shot("", "simulator", Trajectory(time, way[:-1], way, way), RED)
+    picture, _ = draw_traces([name], [shot], width, [name])
+    edge = np.concatenate([picture[[0, -1]].reshape(-1, 3), picture[:, [0, -1]].reshape(-1, 3)])
+    assert picture.shape == (HEIGHT, width, 3) and (edge > 200).all(), "nothing is cut off"
+    assert (picture[-20:, : width // 2] < 100).any(), "the name is there"
+
+
+def test_a_long_name_loses_its_middle() -> None:
+    assert shorten("left_gripper_joint", 20) == "left_gripper_joint"
+    assert shorten("left_gripper_joint", 11) == "left_…joint"

@@ -12,6 +12,7 @@ from robots_of_files import as_bullet_reads, holding
 
 from gsl.core.body import Robot, lump
 from gsl.core.dynamics import forward_kinematics
+from gsl.errors import InputError
 from gsl.policies.limits import limits
 from gsl.robots.catalogue import robot
 from gsl.robots.urdf import urdf
@@ -223,3 +224,28 @@ def test_a_floating_joint_is_the_base_that_a_world_may_free(tmp_path: Path) -> N
     rigid = of(tmp_path, free.replace("floating", "fixed"), joint("j1", "a", LIMIT, parent="trunk"))
     assert body.controlled == ("j1",) and lump(body).links.keys() == lump(rigid).links.keys()
     assert any("joint free is rigid here (floating)" in remark for remark in body.remarks)
+
+
+TWICE = {
+    "limit": LIMIT,
+    "safety_controller": 2 * SOFT.format(-0.3, 0.3),
+    "axis": "<axis xyz='0 0 1'/>",
+    "dynamics": 2 * "<dynamics damping='1'/>",
+    "origin": "<origin xyz='0 0 1'/>",
+    "parent": "<parent link='base'/>",
+}
+
+
+@pytest.mark.parametrize("tag", TWICE)
+def test_an_element_that_comes_twice_is_refused(tag: str, tmp_path: Path) -> None:
+    file = written(tmp_path, joint("j1", "a", LIMIT + TWICE[tag]))
+    with pytest.raises(InputError, match=f"joint 'j1': has 2 <{tag}> where one counts; keep one"):
+        robot(file)
+
+
+@pytest.mark.parametrize("tag", ["mass", "inertia"])
+def test_a_mass_that_is_said_twice_is_refused(tag: str, tmp_path: Path) -> None:
+    path = Path(written(tmp_path, joint("j1", "a", LIMIT)))
+    path.write_text(path.read_text().replace(f"<{tag} ", f"<{tag} value='1'/><{tag} ", 1))
+    with pytest.raises(InputError, match=f"has 2 <{tag}> where one counts; keep one"):
+        robot(str(path))

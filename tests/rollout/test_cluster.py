@@ -109,6 +109,17 @@ def test_a_command_comes_to_the_same_payload_on_a_cluster_of_this_machine(tmp_pa
     assert "(unchanged)" in done(*SEARCH, "executor=dask", f"address={NOWHERE}", folder=tmp_path).out  # it asks nobody
 
 
+def test_workers_that_do_not_start_are_one_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(*words: Any, **settings: Any) -> None:
+        raise RuntimeError("Nanny failed to start.")  # what dask says of a script without a main part, for instance
+
+    monkeypatch.setattr(distributed, "LocalCluster", fail)
+    with pytest.raises(
+        GslError, match=r"^dask cannot start its workers here \(Nanny failed to start\.\); look at free"
+    ):
+        played(Cluster(None))
+
+
 def test_trials_of_a_study_go_to_the_workers(address: str, tmp_path: Path) -> None:
     left = ("ane_01", "ane_02", "gat", "gat_005", "effects", "effects_gat")
     words = ("compare", "preset=toy", "trials=2", "iterate.task.duration=1.6", "iterate.workers=1", "~worlds.nao_weak")

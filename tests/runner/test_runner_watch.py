@@ -242,6 +242,27 @@ def test_a_time_limit_that_is_none_is_refused(walk: Path, tmp_path: Path) -> Non
     assert "TIME_LIMIT of the robot's file is nan, not a positive number of seconds" in done.stdout
 
 
+KEEPING = {
+    "thread": ("threading.Thread(target=time.sleep, args=(1e6,), name='motors').start()", "motors"),
+    "pool": (
+        "import concurrent.futures as f; pool = f.ThreadPoolExecutor(1, 'motors'); pool.submit(time.sleep, 1e6)",
+        "motors_0",
+    ),
+    "end of Python": ("import atexit; atexit.register(time.sleep, 1e6)", "something"),
+}
+
+
+@pytest.mark.parametrize("how", KEEPING)
+def test_what_a_robots_file_has_started_does_not_keep_the_runner(walk: Path, tmp_path: Path, how: str) -> None:
+    path, (starts, name) = robot(tmp_path, SLEEPS, "anywhere", "", 0, ""), KEEPING[how]
+    path.write_text(f"{path.read_text()}\n{starts}\n")
+    process = run(walk, "--robot", str(path), "--log", str(tmp_path / "answer.csv"), "--yes", "--unpaced")
+    said = f"runner.py: {name} of the robot's file was still at work 2 s after the end; it is ended"
+    assert (process.returncode, process.stderr) == (0, "")
+    assert process.stdout.splitlines()[-1] == said
+    assert (tmp_path / "answer.csv").read_text().count("\n") > 10
+
+
 def resealed(walk: Path, folder: Path, change: str, value: object) -> Path:
     """A copy of a request with another value in it and a hash that fits."""
     request = json.loads((walk / "request.json").read_text())

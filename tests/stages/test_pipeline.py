@@ -80,7 +80,7 @@ def test_show_tells_where_an_artifact_comes_from_and_what_it_holds(chain: Path) 
         "gsl evaluate name=chain preset=toy",
         f"runs/chain/optimize   {parent['hash'][:12]}   the same",
         "policies in the real world",
-        "in real [cm/s]",
+        "on the real side [cm/s]",
         "pi0, fresh",
         f"{metrics['real_episodes']} real episodes",
         "evaluation.json",

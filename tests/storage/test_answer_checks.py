@@ -49,10 +49,10 @@ def answers(folder: Path, place: Path) -> tuple[dict, dict[str, Answered]]:
     return request, read_answers(place / ASKED, request)
 
 
-def spoilt(found: dict[str, Answered], name: str, how: Callable[[Trajectory], Trajectory]) -> dict[str, Answered]:
-    log = found[name].trajectory
+def spoilt(answered: dict[str, Answered], name: str, how: Callable[[Trajectory], Trajectory]) -> dict[str, Answered]:
+    log = answered[name].trajectory
     assert log is not None
-    return {**found, name: replace(found[name], trajectory=how(log))}
+    return {**answered, name: replace(answered[name], trajectory=how(log))}
 
 
 def test_a_rehearsal_raises_no_suspicion(walks: Path, air: Path, tmp_path: Path) -> None:
@@ -61,8 +61,8 @@ def test_a_rehearsal_raises_no_suspicion(walks: Path, air: Path, tmp_path: Path)
 
 
 def test_of_a_log_of_something_else_it_is_warned_alone(walks: Path, tmp_path: Path) -> None:
-    request, found = answers(walks, tmp_path)
-    foreign = {name: replace(one, path=Path("answer.parquet")) for name, one in found.items()}
+    request, answered = answers(walks, tmp_path)
+    foreign = {name: replace(answer, path=Path("answer.parquet")) for name, answer in answered.items()}
     off = spoilt(foreign, "pi0_01", lambda log: replace(log, action=log.action + 0.3))
     assert any("pi0_01: half of its actions are 0.3 rad or more off" in line for line in check_answers(request, off))
 
@@ -122,9 +122,9 @@ CASES = [
 def test_an_answer_that_cannot_be_one_is_refused(
     walks: Path, tmp_path: Path, how: Callable[[Trajectory], Trajectory], problem: str
 ) -> None:
-    request, found = answers(walks, tmp_path)
+    request, answered = answers(walks, tmp_path)
     with pytest.raises(InputError) as error:
-        check_answers(request, spoilt(found, "pi0_01", how))
+        check_answers(request, spoilt(answered, "pi0_01", how))
     assert problem in str(error.value) and str(error.value).startswith(str(tmp_path)) and "\n" not in str(error.value)
 
 
@@ -132,55 +132,57 @@ def test_an_answer_that_cannot_be_one_is_refused(
 def test_a_joint_that_stands_still_under_commands_is_refused_unless_it_ended_the_episode(
     air: Path, tmp_path: Path, how: Callable[[Trajectory], Trajectory]
 ) -> None:
-    request, found = answers(air, tmp_path)
-    name = next(iter(found))
+    request, answered = answers(air, tmp_path)
+    name = next(iter(answered))
     with pytest.raises(InputError, match=r"position\.\w+ stands still from row \d+ on for 1 s, though it was sent 0\."):
-        check_answers(request, spoilt(found, name, how))
-    ended = spoilt(found, name, how)
+        check_answers(request, spoilt(answered, name, how))
+    ended = spoilt(answered, name, how)
     check_answers(request, {**ended, name: replace(ended[name], stopped=True)})
 
 
 def test_a_joint_far_from_all_it_was_sent_is_refused(air: Path, tmp_path: Path) -> None:
-    request, found = answers(air, tmp_path)
-    name = next(iter(found))
+    request, answered = answers(air, tmp_path)
+    name = next(iter(answered))
     with pytest.raises(InputError, match=r"rad off all that it was sent in 0\.3 s; run it again, or take it in with"):
-        check_answers(request, spoilt(found, name, away))
+        check_answers(request, spoilt(answered, name, away))
 
 
 def test_commands_are_compared_with_those_that_were_asked_for(air: Path, tmp_path: Path) -> None:
-    request, found = answers(air, tmp_path)
-    name = next(iter(found))
+    request, answered = answers(air, tmp_path)
+    name = next(iter(answered))
     with pytest.raises(InputError, match=rf"{name}: \d+ % of its actions are up to 0\.3 rad off what was asked for"):
-        late = np.r_[np.zeros(20), np.full(len(found[name].trajectory) - 20, 0.3)]
+        late = np.r_[np.zeros(20), np.full(len(answered[name].trajectory) - 20, 0.3)]
         knee = late[:, None] * (np.arange(len(request["joints"])) == KNEE)
-        check_answers(request, spoilt(found, name, lambda log: replace(log, action=log.action + knee)))
+        check_answers(request, spoilt(answered, name, lambda log: replace(log, action=log.action + knee)))
 
 
 def test_one_log_for_two_episodes_is_refused_where_they_ask_for_different_things(walks: Path, tmp_path: Path) -> None:
-    request, found = answers(walks, tmp_path)
-    twin = {**found, "neighbour_01": replace(found["pi0_01"])}
-    foreign = {name: replace(one, path=Path("answer.parquet")) for name, one in twin.items()}
+    request, answered = answers(walks, tmp_path)
+    twin = {**answered, "neighbour_01": replace(answered["pi0_01"])}
+    foreign = {name: replace(answer, path=Path("answer.parquet")) for name, answer in twin.items()}
     with pytest.raises(InputError, match="pi0_01 and neighbour_01 have the same log, to 1e-05 rad; each of them"):
         check_answers(request, foreign)
-    alike = {**found, "pi0_02": found["pi0_01"]}
+    alike = {**answered, "pi0_02": answered["pi0_01"]}
     assert check_answers(request, alike) == [
         "pi0_01 and pi0_02 have the same log, to 1e-05 rad: is it of a simulation without noise?"
     ]
-    noise = 1e-7 * np.random.default_rng(0).standard_normal(found["pi0_01"].trajectory.position.shape)
+    noise = 1e-7 * np.random.default_rng(0).standard_normal(answered["pi0_01"].trajectory.position.shape)
     nearly = spoilt(twin, "neighbour_01", lambda log: replace(log, position=log.position + noise))
     cut = spoilt(twin, "neighbour_01", lambda log: cut_off(log, 40))
     for copied in (nearly, cut):
         with pytest.raises(InputError, match="pi0_01 and neighbour_01 have the same log"):
-            check_answers(request, {name: replace(one, path=Path("a.parquet")) for name, one in copied.items()})
-    clocked = {name: replace(one, trajectory=replace(one.trajectory, time=one.trajectory.time + 1e-4 * (
-        np.arange(len(one.trajectory.time)) > 0))) for name, one in alike.items()}  # fmt: skip
+            check_answers(request, {name: replace(answer, path=Path("a.parquet")) for name, answer in copied.items()})
+    clocked = {name: replace(answer, trajectory=replace(answer.trajectory, time=answer.trajectory.time + 1e-4 * (
+        np.arange(len(answer.trajectory.time)) > 0))) for name, answer in alike.items()}  # fmt: skip
     with pytest.raises(InputError, match="pi0_01 and pi0_02 have the same log"):
         check_answers(request, clocked)
 
 
 def test_a_log_that_runs_backwards_is_told(walks: Path, tmp_path: Path) -> None:
-    request, found = answers(walks, tmp_path)
-    turned = spoilt(found, "pi0_01", lambda log: replace(log, position=log.position[::-1], velocity=log.velocity[::-1]))
+    request, answered = answers(walks, tmp_path)
+    turned = spoilt(
+        answered, "pi0_01", lambda log: replace(log, position=log.position[::-1], velocity=log.velocity[::-1])
+    )
     assert "pi0_01: its velocities go against its positions; is it turned round in time?" in check_answers(
         request, turned
     )
@@ -212,5 +214,5 @@ def test_the_stages_look_at_answers(walks: Path, tmp_path: Path) -> None:
     said = refused(*COLLECT, folder=tmp_path)
     assert said.startswith(f"{ASKED}/{ANSWER}: pi0_01: 100 % of its actions are up to 0.3 rad off what was asked for")
     path.rename(tmp_path / "mine.csv")
-    told = done("answer", f"request={ASKED}", "logs=mine.csv", folder=tmp_path).err
-    assert "warning: pi0_01: half of its actions are 0.3 rad or more off what the policy does" in told
+    warnings = done("answer", f"request={ASKED}", "logs=mine.csv", folder=tmp_path).err
+    assert "warning: pi0_01: half of its actions are 0.3 rad or more off what the policy does" in warnings

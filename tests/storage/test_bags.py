@@ -29,8 +29,8 @@ MOTORS = {
 }
 
 
-def mapping(folder: Path, **told: Any) -> str:
-    (folder / "m.yaml").write_text(yaml.safe_dump(told, sort_keys=False))
+def mapping(folder: Path, **more: Any) -> str:
+    (folder / "m.yaml").write_text(yaml.safe_dump(more, sort_keys=False))
     return "mapping=m.yaml"
 
 
@@ -64,8 +64,8 @@ def test_motors_in_an_array_of_messages_are_named_by_number(tmp_path: Path, plug
     head, rest = np.array([254, 239], np.uint8), 0.0
     topics: dict[str, list[Any]] = {"/lowcmd": [], "/lowstate": []}
     for goal, q in zip(GOAL, MEASURED, strict=True):
-        commands = [command(1, one, 0.0, 0.0, 20.0, 1.5) for one in (rest, *goal, *[0.0] * 10)]
-        states = [state(1, one, 0.1, 0.2, 30) for one in (rest, *q, *0.01 * np.arange(3, 13))]
+        commands = [command(1, goal_now, 0.0, 0.0, 20.0, 1.5) for goal_now in (rest, *goal, *[0.0] * 10)]
+        states = [state(1, position_now, 0.1, 0.2, 30) for position_now in (rest, *q, *0.01 * np.arange(3, 13))]
         topics["/lowcmd"].append(low_cmd(head, commands, 0))
         topics["/lowstate"].append(low_state(head, states, 0))
     write_ros2(tmp_path / "bag", store, topics, plugin)
@@ -120,7 +120,9 @@ def test_the_first_point_of_a_trajectory_is_a_command_by_joint(tmp_path: Path, r
         from rosbags.rosbag1 import Writer
 
         with Writer(tmp_path / "log.bag") as bag:
-            places = {t: bag.add_connection(t, one[0].__msgtype__, typestore=store) for t, one in topics.items()}
+            places = {
+                t: bag.add_connection(t, messages[0].__msgtype__, typestore=store) for t, messages in topics.items()
+            }
             for row in range(len(TIME)):
                 for topic, messages in topics.items():
                     raw = store.serialize_ros1(messages[row], messages[row].__msgtype__)
@@ -148,3 +150,31 @@ def test_messages_without_a_definition_are_refused_with_what_to_do(tmp_path: Pat
     chosen = mapping(tmp_path, joints={"hip": 1, "knee": 2}, time="time", signals=signals)
     line = refused("import", "source=bag", chosen, folder=tmp_path)
     assert "holds messages of unitree_go/msg/LowState without their definition; write it as MCAP" in line
+
+
+def test_joints_holes_and_ends_of_a_bag_are_told_as_those_of_files(tmp_path: Path) -> None:
+    store = ros2_store()
+    state, header = store.types["sensor_msgs/msg/JointState"], store.types["std_msgs/msg/Header"]
+    stamp, none = store.types["builtin_interfaces/msg/Time"], np.zeros(0)
+    for name, names, hole in (("renamed", ["hip", "knee_2"], 0), ("hole", ["hip", "knee"], 30)):
+        topics: dict[str, list[Any]] = {"/command": [], "/state": []}
+        for row, (goal, q) in enumerate(zip(GOAL, MEASURED, strict=True)):
+            at = START + 10_000_000 * row + hole * 10**9 * (row > 80)
+            for topic, joints, values in (("/command", names, goal), ("/state", ["hip", "knee"], q)):
+                head = header(stamp(at // 10**9, at % 10**9), "")
+                topics[topic].append(state(head, joints, values.copy(), none, none))
+        write_ros2(tmp_path / name, store, topics, "MCAP")
+    form = "position.{joint}"
+    signals = {"action": {"file": "/command", "column": form}, "position": {"file": "/state", "column": form}}
+    chosen = mapping(tmp_path, time="header.stamp", signals=signals)
+    line = refused("import", "source=renamed", chosen, folder=tmp_path)
+    assert line.startswith(
+        "renamed, column /command position.knee_2: goes with /state position.knee_2, which is missing; did you mean "
+        "/state position.knee? Pair all: 'mapping.signals.action={column: {knee: position.knee_2, ...}}'"
+    )
+    said = done("import", "source=hole", chosen, "name=log", folder=tmp_path)
+    assert "warning: hole: has no row for 30 s after 0.8 s, and is cut into 2 episodes" in said.err
+    file = next((tmp_path / "hole").glob("*.mcap"))
+    file.write_bytes(file.read_bytes()[:-500])
+    line = refused("import", "source=hole", chosen, folder=tmp_path)
+    assert line.endswith(f"if its recorder was killed: mcap recover hole/{file.name} -o whole.mcap")

@@ -47,7 +47,7 @@ def test_collect_plays_a_command_file_and_knows_when_it_changed(tmp_path: Path) 
     line = (*LINE, "policy.file=experiment.json")
     done(*line, folder=tmp_path)
     batch = read(tmp_path / "runs/x/collect_real/trajectories.parquet")
-    assert [one["policy"] for one in batch.metadata["episodes"]] == ["fast", "short"]
+    assert [entry["policy"] for entry in batch.metadata["episodes"]] == ["fast", "short"]
     wanted = read_commands(tmp_path / "experiment.json", nao()).episodes
     for episode, (_, action) in zip(batch.episodes, wanted, strict=True):
         np.testing.assert_array_equal(episode.action, action)

@@ -48,13 +48,13 @@ def plain() -> dict[str, np.ndarray]:
 
 
 def mapping(file: Path, **settings: Any) -> str:
-    told = {
+    mapping = {
         "joints": list(JOINTS),
         "time": {"column": "t"},
         "signals": {"action": "goal_{joint}", "position": "q_{joint}"},
         **settings,
     }
-    file.write_text(yaml.safe_dump(told, sort_keys=False))
+    file.write_text(yaml.safe_dump(mapping, sort_keys=False))
     return f"mapping={file}"
 
 
@@ -165,6 +165,22 @@ def test_units_signs_zeros_and_old_names_are_converted(tmp_path: Path) -> None:
     assert sensors["load"][0] == pytest.approx(-0.1) and batch.metadata["units"]["load"] == "%"
 
 
+def test_a_joint_that_slides_is_mapped_in_millimetres_and_newtons(tmp_path: Path) -> None:
+    columns = {**plain(), "goal_elbow": 1e3 * ACTION[:, 1], "q_elbow": 1e3 * POSITION[:, 1], "f": TIME, "v": TIME}
+    signals = {
+        "action": {"column": "goal_{joint}", "unit": {"elbow": "mm"}},
+        "position": {"column": "q_{joint}", "unit": {"shoulder": "rad", "elbow": "mm"}},
+        "velocity": {"column": ["v", "v[0]"], "unit": {"shoulder": "rad/s", "elbow": "mm/s"}},
+        "torque": {"column": ["f", "f[0]"], "unit": {"shoulder": "mNm", "elbow": "N"}},
+    }
+    batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), mapping(tmp_path / "m.yaml", signals=signals))
+    check_same(batch)
+    (episode,) = batch.episodes
+    np.testing.assert_allclose(episode.velocity, np.column_stack([TIME, 1e-3 * TIME]), atol=1e-12)
+    np.testing.assert_allclose(episode.sensors["torque.elbow"], TIME, atol=1e-12)
+    np.testing.assert_allclose(episode.sensors["torque.shoulder"], 1e-3 * TIME, atol=1e-12)
+
+
 @pytest.mark.parametrize("joints", [JOINTS, None])
 def test_signs_and_columns_may_differ_by_joint_and_by_axis(tmp_path: Path, joints: tuple[str, ...] | None) -> None:
     columns = plain() | {"q_elbow": -POSITION[:, 1], **{f"w{axis}": k + TIME for k, axis in enumerate("abc")}}
@@ -250,7 +266,7 @@ def test_an_episode_is_cut_at_its_holes_and_what_precedes_the_first_command_is_d
     columns = {name: values[keep] for name, values in plain().items()}
     batch = imported(tmp_path, csv(tmp_path / "log.csv", columns), mapping(tmp_path / "m.yaml"))
     assert [label["part"] for label in batch.metadata["episodes"]] == [1, 2]
-    assert [len(one.time) for one in batch.episodes] == [100, 150]
+    assert [len(episode.time) for episode in batch.episodes] == [100, 150]
 
 
 def test_a_column_can_tell_episodes_apart_and_empty_cells_can_mean_no_news(tmp_path: Path) -> None:
@@ -300,11 +316,14 @@ def test_a_mapping_may_lie_anywhere(tmp_path: Path) -> None:
 def test_a_check_writes_nothing_and_finds_the_lag(tmp_path: Path) -> None:
     source, chosen = csv(tmp_path / "log.csv", plain()), mapping(tmp_path / "m.yaml")
     before = sorted(tmp_path.rglob("*"))
-    told = json.loads(done("import", f"source={source}", chosen, "--check", "--json", folder=tmp_path).out)
+    report = json.loads(done("import", f"source={source}", chosen, "--check", "--json", folder=tmp_path).out)
     assert sorted(tmp_path.rglob("*")) == before
-    (episode,) = told["episodes"]
+    (episode,) = report["episodes"]
     assert episode["lag"] == pytest.approx(LAG, abs=0.004) and episode["rate"] == pytest.approx(100.0)
-    assert told["refused"] == [] and {one["column"] for one in told["channels"]} >= {"position.elbow", "action.elbow"}
+    assert report["refused"] == [] and {channel["column"] for channel in report["channels"]} >= {
+        "position.elbow",
+        "action.elbow",
+    }
     assert "nothing is written" in done("import", f"source={source}", chosen, "check=true", folder=tmp_path).out
 
 
@@ -316,8 +335,8 @@ def test_the_shipped_logs_are_imported(tmp_path: Path, name: str, episodes: int,
     done("import", f"mapping={name}", f"name={name}", folder=tmp_path)
     batch = read(tmp_path / f"runs/{name}/import/trajectories.parquet")
     assert (len(batch), len(batch.joints)) == (episodes, joints)
-    assert sum(one.time[-1] for one in batch.episodes) == pytest.approx(seconds, abs=0.1)
-    assert max(np.abs(one.position).max() for one in batch.episodes) < np.pi
+    assert sum(episode.time[-1] for episode in batch.episodes) == pytest.approx(seconds, abs=0.1)
+    assert max(np.abs(episode.position).max() for episode in batch.episodes) < np.pi
 
 
 def test_the_pendulum_says_what_hung_on_it(tmp_path: Path) -> None:
@@ -327,7 +346,9 @@ def test_the_pendulum_says_what_hung_on_it(tmp_path: Path) -> None:
     assert batch.joints == ("joint",) and batch.control_period == 0.005
     assert {label["kp"] for label in labels} == {100, 200, 400, 800}
     assert labels[0].items() >= {"mass": 0.49, "length": 0.1, "vin": 7.4, "trajectory": "sin_sin"}.items()
-    off = next(one for one, label in zip(batch.episodes, labels, strict=True) if label["trajectory"] == "lift_and_drop")
+    off = next(
+        episode for episode, label in zip(batch.episodes, labels, strict=True) if label["trajectory"] == "lift_and_drop"
+    )
     assert 0.0 < np.mean(off.sensors["enabled"]) < 1.0 and off.sensors["voltage"].min() > 5.0
 
 

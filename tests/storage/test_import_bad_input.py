@@ -108,6 +108,10 @@ WRONG = {
     "a word": (changed("q_elbow", at(7, "stall")), "column q_elbow, line 9: 'stall' is not a number"),
     "texts": (lambda c: {**c, "q_elbow": np.full(len(TIME), "up")}, "column q_elbow: holds texts"),
     "an empty stamp": (changed("t", at(5, "")), "column t, line 7: is not a finite number"),
+    "an angle that wraps": (
+        lambda c: {**c, "goal_shoulder": 8.0 * c["goal_shoulder"], "q_shoulder": np.mod(8.0 * c["q_shoulder"], 6.2832)},
+        "log.csv: position.shoulder, episode 0, row .* jumps by a turn, .* mapping.unwrap=true joins the turns",
+    ),
     "one row": (lambda c: {name: values[:1] for name, values in c.items()}, "has 1 row of positions"),
     "no rows": (lambda c: {name: values[:0] for name, values in c.items()}, "has no rows; log it again"),
 }
@@ -146,6 +150,16 @@ def test_what_looks_wrong_can_be_accepted(tmp_path: Path) -> None:
     assert said.code == 0 and "warning: position: comes 50 ms before action" in said.err
 
 
+@pytest.mark.parametrize(("rows", "words"), [(0, "of this row"), (1, "of the next row")])
+def test_commands_that_are_copies_of_positions_are_told(tmp_path: Path, rows: int, words: str) -> None:
+    columns = {name: np.roll(plain()[name.replace("goal", "q")], -rows) for name in plain() if name != "t"}
+    columns = {name: values if name.startswith("goal") else plain()[name] for name, values in columns.items()}
+    source = csv(tmp_path / "log.csv", {"t": TIME[:-1], **{name: values[:-1] for name, values in columns.items()}})
+    said = gsl("import", f"source={source}", mapping(tmp_path / "m.yaml"), "--check", folder=tmp_path)
+    assert said.code == 0
+    assert f"action.shoulder, action.elbow: is a copy of the measured position {words}" in said.out
+
+
 def test_a_stamp_that_comes_twice_can_be_dropped(tmp_path: Path) -> None:
     source = csv(tmp_path / "log.csv", stuck(plain()))
     said = gsl("import", f"source={source}", mapping(tmp_path / "m.yaml", duplicates="drop"), folder=tmp_path)
@@ -171,7 +185,7 @@ TEXT = b"t,goal_shoulder\n" + b"0.01,0.5\n" * 500
 FILES = {
     "empty.csv": (b"", "is empty"),
     "empty.csv.gz": (gzip.compress(b""), "is empty"),
-    "cut.csv.gz": (gzip.compress(TEXT)[:-20], "is no gzip file, or truncated or damaged"),
+    "cut.csv.gz": (gzip.compress(TEXT)[:-20], "is cut off, as that of a killed logger is"),
     "plain.csv.gz": (TEXT, "is no gzip file"),
     "binary.csv": (bytes(range(1, 256)), "is no text"),
     "pickle.csv": (pickle.dumps(TIME), "is a Python pickle"),
@@ -311,7 +325,7 @@ SETTINGS = {
         "mapping.signals.action.file = cmd: is no topic of a bag",
     ),
     "joints twice": ({"joints": ["a", "a"]}, "mapping.joints = a, a: must be different names"),
-    "a negative period": ({"period": -1}, "mapping.period = -1: must be above 0 (s)"),
+    "a negative period": ({"period": -1}, "mapping.period = -1: must be at least 1e-06 (s)"),
     "a field": (
         {"about": {"kp": "{gain}"}},
         "mapping.about.kp = {gain}: there is no field or column gain; there is file",
@@ -355,9 +369,9 @@ def test_a_log_that_was_not_imported_says_what_to_do_first(tmp_path: Path) -> No
     for place in ("log.csv", "logs/log.csv"):
         (tmp_path / place).parent.mkdir(exist_ok=True)
         csv(tmp_path / place, plain())
-    for given in ("log.csv", "logs"):
-        line = refused("diagnose", f"real={given}", "sim=so101", "out=runs/refused", folder=tmp_path)
-        assert f"gsl import source={given} " in line
+    for source in ("log.csv", "logs"):
+        line = refused("diagnose", f"real={source}", "sim=so101", "out=runs/refused", folder=tmp_path)
+        assert f"gsl import source={source} " in line
 
 
 def test_sources_and_mappings_that_are_not_there_are_one_clear_line(tmp_path: Path) -> None:

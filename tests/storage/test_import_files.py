@@ -13,6 +13,7 @@ import yaml
 from commands import done, gsl, refused
 
 from gsl.core.trajectory import Batch
+from gsl.storage.importers.sizes import DAMAGED
 from gsl.storage.trajectories import read
 
 pytestmark = pytest.mark.slow
@@ -30,8 +31,8 @@ ARRAYS = {"time": TIME, "des_dof_pos": ACTION, "dof_pos": POSITION}
 
 
 def mapping(folder: Path, action: Any = "des_dof_pos", position: Any = "dof_pos", **more: Any) -> str:
-    told = {"joints": list(JOINTS), "signals": {"action": action, "position": position}, **more}
-    (folder / "m.yaml").write_text(yaml.safe_dump(told, sort_keys=False))
+    mapping = {"joints": list(JOINTS), "signals": {"action": action, "position": position}, **more}
+    (folder / "m.yaml").write_text(yaml.safe_dump(mapping, sort_keys=False))
     return "mapping=m.yaml"
 
 
@@ -74,7 +75,7 @@ def test_tensors_come_without_the_code_of_their_pickle(tmp_path: Path) -> None:
         line = refused("import", f"source={name}.pt", mapping(tmp_path), folder=tmp_path)
         assert line.startswith(f"{name}.pt: holds more than tensors (a pickle, which can run code)")
     line = refused("import", "source=c.pt", mapping(tmp_path), folder=tmp_path)
-    assert line == "c.pt: is no file of torch.save, or truncated or damaged; copy it again"
+    assert line == f"c.pt: is no file of torch.save, or {DAMAGED}"
     assert not (tmp_path / "ran").exists()
 
 
@@ -94,7 +95,7 @@ def test_matrices_of_matlab_are_read_and_fields_of_structs(tmp_path: Path) -> No
     check_same(imported(tmp_path, "struct.mat", mapping(tmp_path, "run.goal", "run.q", time="run.t")))
     (tmp_path / "bad.mat").write_bytes(b"MATLAB 5.0 MAT-file" + bytes(200))
     line = refused("import", "source=bad.mat", mapping(tmp_path), folder=tmp_path)
-    assert line == "bad.mat: is no MATLAB file, or truncated or damaged; save it again"
+    assert line == f"bad.mat: is no MATLAB file, or {DAMAGED}"
 
 
 def test_npy_files_are_one_episode_together_or_a_table_alone(tmp_path: Path) -> None:
@@ -143,7 +144,7 @@ def test_hdf5_is_read_a_file_an_episode_or_a_group_an_episode(tmp_path: Path) ->
     chosen = mapping(tmp_path, "actions", "obs/joint_pos", records="data/demo_*", time={"period": 0.01})
     batch = imported(tmp_path, "demos.h5", chosen)
     check_same(batch, episodes=3)
-    names = [one["file"] for one in batch.metadata["episodes"]]
+    names = [entry["file"] for entry in batch.metadata["episodes"]]
     assert names == [f"demos/data/demo_{k}" for k in (0, 2, 10)]
     chosen = mapping(tmp_path, "elsewhere", "data/demo_0/obs/joint_pos", time={"period": 0.01})
     assert "column elsewhere: is missing" in refused("import", "source=demos.h5", chosen, folder=tmp_path)
@@ -166,7 +167,7 @@ def test_two_files_an_episode_are_paired_by_what_their_names_share(tmp_path: Pat
     chosen = mapping(tmp_path, **signals, files={"cmd": "*_cmd.csv", "state": "*_state.csv"}, time="t")
     batch = imported(tmp_path, "logs", chosen)
     check_same(batch, episodes=2)
-    assert [one["file"] for one in batch.metadata["episodes"]] == ["logs/ep1", "logs/ep2"]
+    assert [entry["file"] for entry in batch.metadata["episodes"]] == ["logs/ep1", "logs/ep2"]
     (tmp_path / "logs/ep2_state.csv").unlink()
     line = refused("import", "source=logs", chosen, folder=tmp_path)
     assert line == "logs: there is no ep2_state.csv, which the mapping wants as the state of ep2"
@@ -227,8 +228,8 @@ def test_a_counter_that_begins_again_goes_on(tmp_path: Path, unit: str, top: flo
     plain_csv(tmp_path, (top - 1.0 / tick + TIME / tick) % top)
     line = refused("import", "source=log.csv", f"mapping.time.unit={unit}", folder=tmp_path)
     assert f"a counter that begins again? mapping.time.wrap={top:.12g} says so" in line
-    told = ("mapping.time.unit=" + unit, f"mapping.time.wrap={top:.12g}")
-    check_same(imported(tmp_path, "log.csv", *told), tolerance=1e-6)
+    settings = ("mapping.time.unit=" + unit, f"mapping.time.wrap={top:.12g}")
+    check_same(imported(tmp_path, "log.csv", *settings), tolerance=1e-6)
 
 
 def test_names_that_the_command_line_cannot_read_come_with_their_quotes(tmp_path: Path) -> None:
@@ -239,6 +240,13 @@ def test_names_that_the_command_line_cannot_read_come_with_their_quotes(tmp_path
         assert line.endswith(f"such characters take quotes inside those of the shell: 'source=\"{name}\"'")
         done("import", f'source="{name}"', "--check", folder=tmp_path)
         (tmp_path / name).rename(tmp_path / "log.csv")
+
+
+def test_a_folder_called_by_a_number_comes_with_its_quotes(tmp_path: Path) -> None:
+    line = refused("import", "source=20", mapping(tmp_path), folder=tmp_path)
+    assert line == "source = 20: must be a text; in quotes inside those of the shell it is: '\"20\"'"
+    line = refused("import", 'source="20"', mapping(tmp_path), folder=tmp_path)
+    assert line == "source = 20: there is no such file, folder or pattern"
 
 
 def test_a_lag_is_the_same_whenever_the_clock_began(tmp_path: Path) -> None:

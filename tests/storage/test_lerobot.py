@@ -137,11 +137,11 @@ def recorded(scale: Any, count: int = 3) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def calibration(path: Path) -> Path:
     """Write a calibration as LeRobot keeps it."""
-    told = {
+    info = {
         name: {"id": k, "drive_mode": 0, "homing_offset": 7, "range_min": LOW[name], "range_max": LOW[name] + ticks}
         for k, (name, ticks) in enumerate(RANGES.items(), 1)
     }
-    path.write_text(json.dumps(told))
+    path.write_text(json.dumps(info))
     return path
 
 
@@ -154,7 +154,7 @@ def test_an_arm_needs_no_mapping_in_any_version_and_scale(tmp_path: Path, versio
     assert batch.joints == OURS and len(batch.episodes) == 3
     assert batch.control_period == pytest.approx(1.0 / FPS, abs=1e-6)
     assert batch.metadata["robot"] == "so101"
-    assert [one["file"] for one in batch.metadata["episodes"]] == [f"wave/episode_{k:06d}" for k in range(3)]
+    assert [entry["file"] for entry in batch.metadata["episodes"]] == [f"wave/episode_{k:06d}" for k in range(3)]
     for seed, episode in enumerate(batch.episodes):
         commands, measured = motion(FRAMES + 10 * seed, seed)
         np.testing.assert_allclose(episode.time, np.arange(FRAMES + 10 * seed) / FPS, atol=1e-12)
@@ -213,7 +213,7 @@ def test_joints_keep_their_names_when_asked_and_other_mappings_see_the_lists(tmp
     done("import", "source=wave", "mapping=own.yaml", "name=own", folder=tmp_path)
     batch = read(tmp_path / "runs/own/import/trajectories.parquet")
     np.testing.assert_allclose(batch.episodes[0].position[:, 0], radians(motion()[1])[:, 0], atol=2e-6)
-    assert [one["policy"] for one in batch.metadata["episodes"]] == ["wave 0", "wave 1", "wave 2"]
+    assert [entry["policy"] for entry in batch.metadata["episodes"]] == ["wave 0", "wave 1", "wave 2"]
 
 
 def test_a_data_set_without_names_is_asked_for_them(tmp_path: Path) -> None:

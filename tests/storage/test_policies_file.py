@@ -28,9 +28,9 @@ def path(tmp_path: Path) -> Path:
 
 
 def test_what_is_written_is_read_to_the_bit(path: Path) -> None:
-    found = read_policies(path)
-    assert found == POLICIES
-    assert [record.parameters["period"].hex() for record in found.records] == [(1 / 3).hex(), (5e-324).hex()]
+    stored = read_policies(path)
+    assert stored == POLICIES
+    assert [record.parameters["period"].hex() for record in stored.records] == [(1 / 3).hex(), (5e-324).hex()]
 
 
 def test_same_policies_same_bytes(path: Path) -> None:

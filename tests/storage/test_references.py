@@ -112,8 +112,8 @@ def test_a_file_is_no_artifact_to_load(runs: Path) -> None:
 def test_every_complete_artifact_is_listed_and_nothing_else(runs: Path) -> None:
     (runs / "foreign").mkdir()
     (runs / "foreign/manifest.json").write_text("{}")
-    found = [artifact.folder.relative_to(runs).as_posix() for artifact in find_all(runs)]
-    assert sorted(found) == [
+    folders = [artifact.folder.relative_to(runs).as_posix() for artifact in find_all(runs)]
+    assert sorted(folders) == [
         "quick-start/collect",
         "quick-start/optimize",
         "study/iteration_01/optimize",

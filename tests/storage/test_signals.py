@@ -36,7 +36,7 @@ def log(
 
 
 def kinds(episodes: list[Trajectory]) -> list[tuple[str, tuple[str, ...]]]:
-    return [(one.kind, one.joints) for one in check_signals(episodes, JOINTS)]
+    return [(finding.kind, finding.joints) for finding in check_signals(episodes, JOINTS)]
 
 
 def column(k: int, change: Change) -> Change:
@@ -89,8 +89,8 @@ def test_a_command_that_jumps_with_its_position_is_no_wrap() -> None:
 
 
 def test_a_sample_that_jumps_and_is_back_is_a_glitch_with_its_row() -> None:
-    (found,) = check_signals(log(position=column(2, put(57, 0.3))), JOINTS)
-    assert (found.kind, found.joints, found.row, found.times) == ("glitch", ("wrist",), 57, 2)
+    (finding,) = check_signals(log(position=column(2, put(57, 0.3))), JOINTS)
+    assert (finding.kind, finding.joints, finding.row, finding.times) == ("glitch", ("wrist",), 57, 2)
     mended = mend_signals(log(position=column(2, put(57, 0.3))))[0].position[57, 2]
     assert abs(mended - log()[0].position[57, 2]) < 0.02
 
@@ -104,10 +104,12 @@ def test_steps_tops_and_noise_are_no_glitches() -> None:
 
 @pytest.mark.parametrize(("row", "words"), [(0, "this row"), (1, "the next row")])
 def test_commands_that_are_positions_are_copies(row: int, words: str) -> None:
-    episodes = [Trajectory(TIME, one.position[row : row + ROWS], one.position, one.velocity) for one in log()]
-    (found,) = check_signals(episodes, JOINTS)
-    assert (found.kind, found.joints) == ("copy", JOINTS)
-    assert words in found.sentence
+    episodes = [
+        Trajectory(TIME, episode.position[row : row + ROWS], episode.position, episode.velocity) for episode in log()
+    ]
+    (finding,) = check_signals(episodes, JOINTS)
+    assert (finding.kind, finding.joints) == ("copy", JOINTS)
+    assert words in finding.sentence
 
 
 def test_a_position_that_is_another_joints_is_a_copy_unless_both_are_commanded_alike() -> None:
@@ -119,8 +121,8 @@ def test_a_position_that_is_another_joints_is_a_copy_unless_both_are_commanded_a
 
 
 def test_frozen_and_stale_positions_are_seen() -> None:
-    (found,) = check_signals(log(position=column(0, frozen)), JOINTS)
-    assert (found.kind, found.joints, found.row) == ("frozen", ("shoulder",), 100)
+    (finding,) = check_signals(log(position=column(0, frozen)), JOINTS)
+    assert (finding.kind, finding.joints, finding.row) == ("frozen", ("shoulder",), 100)
     assert kinds(log(position=column(0, stale))) == [("stale", ("shoulder",))]
 
 
@@ -148,15 +150,15 @@ def turning(*, order: str = "xyzw", gyro: str = "body", speed: str = "world") ->
     place = np.column_stack([np.sin(TIME), 0.5 * TIME, 0.3 + 0.0 * TIME])
     moving = np.gradient(place, TIME, axis=0)
     quaternion = turns.as_quat()[:, [0, 1, 2, 3] if order == "xyzw" else [3, 0, 1, 2]]
-    told = {
+    cases = {
         "base.orientation": ("xyzw", quaternion),
         "gyro": ("xyz", rates if gyro == "body" else turns.apply(rates)),
         "base.position": ("xyz", place),
         "base.velocity": ("xyz", moving if speed == "world" else turns.inv().apply(moving)),
     }
-    sensors = {f"{name}.{axis}": values[:, k] for name, (axes, values) in told.items() for k, axis in enumerate(axes)}
-    one = log()[0]
-    return [Trajectory(TIME, one.action, one.position, one.velocity, sensors=sensors)]
+    sensors = {f"{name}.{axis}": values[:, k] for name, (axes, values) in cases.items() for k, axis in enumerate(axes)}
+    episode = log()[0]
+    return [Trajectory(TIME, episode.action, episode.position, episode.velocity, sensors=sensors)]
 
 
 def test_the_order_of_a_quaternion_and_the_axes_of_rates_are_seen() -> None:
@@ -166,6 +168,6 @@ def test_the_order_of_a_quaternion_and_the_axes_of_rates_are_seen() -> None:
         ({"gyro": "world"}, "gyro.x"),
         ({"speed": "body"}, "base.velocity.x"),
     ):
-        (found,) = check_signals(turning(**wrong), JOINTS)
-        assert found.kind == "base_frame"
-        assert words in found.sentence
+        (finding,) = check_signals(turning(**wrong), JOINTS)
+        assert finding.kind == "base_frame"
+        assert words in finding.sentence

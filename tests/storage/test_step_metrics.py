@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+import time
 from collections.abc import Mapping
+from datetime import datetime
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -84,8 +87,8 @@ def test_a_network_notes_every_epoch_and_is_the_same_with_a_listener(tmp_path: P
 
 def test_the_command_shows_steps_and_says_in_a_line_what_is_wrong(tmp_path: Path) -> None:
     climb(tmp_path / "runs/a/climb")
-    told = json.loads(done("metrics", "a", "--json", folder=tmp_path).out)
-    assert [line["values"] for line in told["artifacts"]["a/climb"]][1] == {"height": 2.0}
+    rows = json.loads(done("metrics", "a", "--json", folder=tmp_path).out)
+    assert [line["values"] for line in rows["artifacts"]["a/climb"]][1] == {"height": 2.0}
     assert "height" in done("metrics", "a", folder=tmp_path).out
     assert "exists" in refused("metrics", "a", "tensorboard=runs", folder=tmp_path)
     assert "no such setting" in refused("metrics", "a", "wandb=x", folder=tmp_path)
@@ -109,3 +112,29 @@ def test_tensorboard_reads_what_is_written_for_it(tmp_path: Path) -> None:
     events.Reload()
     assert [(event.step, event.value) for event in events.Scalars("climb_2/height")] == [(1, 2.0), (2, 4.0), (3, 6.0)]
     assert events.Scalars("climb/height")[0].wall_time == pytest.approx(read_steps(folder)[0].time)
+
+
+class Searching:
+    """A stage on a task whose values are shown in cm/s; its steps are done at times of its own."""
+
+    kind, task = "optimize", SimpleNamespace(shown=100.0, unit="cm/s")
+    moments = (time.time() + 3600.0, time.time() + 3601.5)
+
+    def parents(self) -> Mapping[str, Path]:
+        return {}
+
+    def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+        for step, (moment, best) in enumerate(zip(self.moments, (0.25, 0.5), strict=True), 1):
+            with pytest.MonkeyPatch.context() as patch:
+                patch.setattr(time, "time", lambda moment=moment: moment)
+                note_step("search", step, best=best, falls=2.0)
+        return {}
+
+
+def test_metrics_are_shown_in_the_unit_of_the_task_and_from_the_start_of_the_run(tmp_path: Path) -> None:
+    made = build(Searching(), config={}, out=tmp_path / "runs/a/optimize", command="", force=False, console=None)  # type: ignore[arg-type]
+    begun = datetime.fromisoformat(made.manifest.created).timestamp()
+    lines = [line.split() for line in done("metrics", "a", folder=tmp_path).out.splitlines()]
+    assert ["run", "step", "time", "[s]", "best", "[cm/s]", "falls"] in lines
+    for step, (moment, best) in enumerate(zip(Searching.moments, ("25.0", "50.0"), strict=True), 1):
+        assert ["1", str(step), f"{round(moment, 3) - begun:.1f}", best, "2"] in lines

@@ -45,24 +45,25 @@ def path(tmp_path: Path, batch: Batch) -> Path:
 
 
 def test_what_is_written_is_read_to_the_bit(path: Path, batch: Batch) -> None:
-    found = read(path, joints=(*JOINTS, "HeadYaw"))
-    assert (found.joints, found.control_period) == (batch.joints, batch.control_period)
-    assert found.metadata.items() >= batch.metadata.items()
-    for one, other in zip(found.episodes, batch.episodes, strict=True):
+    stored = read(path, joints=(*JOINTS, "HeadYaw"))
+    assert (stored.joints, stored.control_period) == (batch.joints, batch.control_period)
+    assert stored.metadata.items() >= batch.metadata.items()
+    for episode, other in zip(stored.episodes, batch.episodes, strict=True):
         for name in ("time", "action", "position", "velocity", "grounded_action", "reward", "fell"):
-            np.testing.assert_array_equal(getattr(one, name), getattr(other, name))
-        assert one.sensors.keys() == other.sensors.keys()
-        for name in one.sensors:
-            np.testing.assert_array_equal(one.sensors[name], other.sensors[name])
+            np.testing.assert_array_equal(getattr(episode, name), getattr(other, name))
+        assert episode.sensors.keys() == other.sensors.keys()
+        for name in episode.sensors:
+            np.testing.assert_array_equal(episode.sensors[name], other.sensors[name])
 
 
 def test_a_batch_without_optional_columns_makes_the_trip_too(tmp_path: Path, batch: Batch) -> None:
     bare = [
-        dataclasses.replace(one, grounded_action=None, reward=None, fell=None, sensors={}) for one in batch.episodes
+        dataclasses.replace(episode, grounded_action=None, reward=None, fell=None, sensors={})
+        for episode in batch.episodes
     ]
     write(tmp_path / "bare.parquet", dataclasses.replace(batch, episodes=tuple(bare)))
-    found = read(tmp_path / "bare.parquet").episodes[1]
-    assert (found.grounded_action, found.reward, found.fell, dict(found.sensors)) == (None, None, None, {})
+    stored = read(tmp_path / "bare.parquet").episodes[1]
+    assert (stored.grounded_action, stored.reward, stored.fell, dict(stored.sensors)) == (None, None, None, {})
 
 
 def test_same_data_same_bytes(path: Path, tmp_path: Path, batch: Batch) -> None:
@@ -89,8 +90,10 @@ def test_the_file_is_the_published_contract(path: Path) -> None:
 def test_a_column_of_ones_own_passes_with_a_unit(tmp_path: Path, batch: Batch) -> None:
     metadata = {**batch.metadata, "units": {"battery": "A"}}
     episodes = tuple(
-        dataclasses.replace(one, sensors={"battery": np.ones(len(one) + 1), "battery.cell": np.ones(len(one) + 1)})
-        for one in batch.episodes
+        dataclasses.replace(
+            episode, sensors={"battery": np.ones(len(episode) + 1), "battery.cell": np.ones(len(episode) + 1)}
+        )
+        for episode in batch.episodes
     )
     write(tmp_path / "own.parquet", dataclasses.replace(batch, episodes=episodes, metadata=metadata))
     assert set(read(tmp_path / "own.parquet").episodes[0].sensors) == {"battery", "battery.cell"}
@@ -102,8 +105,8 @@ def test_single_precision_and_null_are_read(path: Path) -> None:
     column = pa.array(np.where(np.isnan(values), 0, values), type=pa.float32(), mask=np.isnan(values))
     index = table.column_names.index("action.LKneePitch")
     pq.write_table(table.set_column(index, "action.LKneePitch", column), path)
-    found = read(path).episodes[1].action
-    np.testing.assert_allclose(found[:, 0], values[5:8], rtol=1e-6)
+    action = read(path).episodes[1].action
+    np.testing.assert_allclose(action[:, 0], values[5:8], rtol=1e-6)
 
 
 def setting(name: str, row: int, value: Any) -> Callable[[pa.Table], pa.Table]:
@@ -266,14 +269,14 @@ def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
 
 
 def test_what_a_reader_would_refuse_is_not_written(tmp_path: Path, batch: Batch) -> None:
-    one = batch.episodes[0]
+    first = batch.episodes[0]
     wrong = [
-        dataclasses.replace(one, position=np.full_like(one.position, np.nan)),
-        dataclasses.replace(one, position=one.position[:-1]),
-        dataclasses.replace(one, action=one.action[:, :1]),
-        dataclasses.replace(one, time=one.time[::-1]),
-        dataclasses.replace(one, sensors={"giro.x": one.time}),
-        dataclasses.replace(one, reward=None),
+        dataclasses.replace(first, position=np.full_like(first.position, np.nan)),
+        dataclasses.replace(first, position=first.position[:-1]),
+        dataclasses.replace(first, action=first.action[:, :1]),
+        dataclasses.replace(first, time=first.time[::-1]),
+        dataclasses.replace(first, sensors={"giro.x": first.time}),
+        dataclasses.replace(first, reward=None),
     ]
     for episode in wrong:
         with pytest.raises(TrajectoryError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import os
+import re
 import subprocess
 import sys
 import time
@@ -30,12 +31,16 @@ class Said(NamedTuple):
         return self.err.splitlines()
 
 
+PROGRESS = re.compile(r"^\d+ % done|, \d+ (?:s|min)(?:, compiling.*)?$")
+
+
 def gsl(*arguments: str, folder: Path) -> Said:
-    """Run a command line in this process, in `folder`."""
+    """Run a command line in this process, in `folder`; what it says of its progress depends on the computer."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.chdir(folder), contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
         code = call(list(arguments))
-    return Said(code, out.getvalue(), err.getvalue())
+    lines = [line for line in err.getvalue().splitlines(keepends=True) if not PROGRESS.search(line)]
+    return Said(code, out.getvalue(), "".join(lines))
 
 
 def done(*arguments: str, folder: Path) -> Said:

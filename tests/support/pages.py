@@ -11,9 +11,10 @@ from typing import NamedTuple
 ROOT = Path(__file__).parents[2]
 RESULTS = sorted((ROOT / "docs/results").rglob("*.md"))  # figures with their own tests
 GUIDES = [ROOT / "README.md", *(page for page in sorted((ROOT / "docs").rglob("*.md")) if page not in RESULTS)]
+WRITTEN = [*GUIDES, *(page for page in RESULTS if page.parent.name == "results")]  # below it, studies write tables
 
 FENCE = re.compile(r"^( *)```(\w*)\n(.*?)^\1```$", re.MULTILINE | re.DOTALL)
-ITEM = re.compile(r"\s*([-*]|\d+\.) ")
+ITEM = re.compile(r"^\s*([-*]|\d+\.) ")
 LINK = re.compile(r"!?\[([^\]]*)\]\(([^)\s]+)\)")
 # A sentence ends before a capital letter, a code word, or a name of the paper's.
 END = re.compile(r"(?<=[.!?])[\"')*]*\s+(?=[A-Zπf*\"'(\[]|CODE)")

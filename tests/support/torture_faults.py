@@ -17,9 +17,10 @@ from pathlib import Path
 import numpy as np
 from commands import ENVIRONMENT, SMALL, Said, eventually, gsl, session, started
 from torture_inputs import judge
-from torture_kills import KILLED, PAIR, again, payloads
+from torture_kills import GONE, KILLED, PAIR, again, payloads
 
 MANY = ("optimize", "name=k", *PAIR, "grounding=none", "preset.generations=6")
+STUDY = ("compare", "name=k", *KILLED["compare"], "trials=2")
 FULL = ("collect", "train-forward", "train-inverse", "evaluate")
 SOON = 10.0  # [s] in which a lost scheduler is said
 
@@ -44,24 +45,42 @@ def _flipped(whole: bytes, rng: np.random.Generator) -> bytes:
 
 
 def fill(folder: Path, number: int, rng: np.random.Generator, counts: Counter[str]) -> None:
-    """Let no file get longer than a random size, as on a full disk: one line, exit code 1, and no artifact."""
+    """Let no file get longer than a random size, or no more be made, as on a full disk: one line and no artifact."""
     for index in range(number):
         name = FULL[index % len(FULL)]
         most = int(rng.integers(1, 3000))
-        process = subprocess.run(
-            [sys.executable, "-m", "gsl", name, "name=k", *KILLED[name]],
-            cwd=folder,
-            env=ENVIRONMENT,
-            capture_output=True,
-            text=True,
-            preexec_fn=lambda most=most: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
-        )
+        words = [sys.executable, "-m", "gsl", name, "name=k", *KILLED[name]]
+        if index // len(FULL) % 2 and (count := int(rng.integers(2, 7))) and _is_mounted(folder / "runs/k", count):
+            process = subprocess.run(words, cwd=folder, env=ENVIRONMENT, capture_output=True, text=True)
+            counts["! half an artifact"] += bool(payloads(folder / "runs/k"))
+            subprocess.run(["umount", folder / "runs/k"], check=True)
+            (folder / "runs/k").rmdir()
+            counts["disks without room for a file"] += 1
+        else:
+            process = subprocess.run(
+                words,
+                cwd=folder,
+                env=ENVIRONMENT,
+                capture_output=True,
+                text=True,
+                preexec_fn=lambda most=most: resource.setrlimit(resource.RLIMIT_FSIZE, (most, most)),
+            )
+            counts["full disks"] += 1
         said = Said(process.returncode, process.stdout, process.stderr)
-        counts["full disks"] += 1
         counts["! full disk not said"] += said.code == 0 or "cannot be written" not in said.err
         counts["! half an artifact"] += (folder / "runs/k").exists()
         judge(said, (name, f"{most} bytes"), counts)
         shutil.rmtree(folder / "runs/k", ignore_errors=True)
+
+
+def _is_mounted(folder: Path, count: int) -> bool:
+    """Mount a disk on which there can be so many files and folders, its own included, if this user may."""
+    folder.mkdir()
+    words = ["mount", "-t", "tmpfs", "-o", f"size=20m,nr_inodes={count}", "tmpfs", folder]
+    if shutil.which("mount") and subprocess.run(words, capture_output=True).returncode == 0:
+        return True
+    folder.rmdir()
+    return False
 
 
 def fault(folder: Path, name: str, rng: np.random.Generator, counts: Counter[str]) -> None:
@@ -78,10 +97,12 @@ def _undisturbed(folder: Path, words: tuple[str, ...]) -> dict[str, str]:
     return wanted
 
 
-def kill_workers(folder: Path, rng: np.random.Generator, counts: Counter[str], *more: str) -> None:
+def kill_workers(
+    folder: Path, rng: np.random.Generator, counts: Counter[str], *more: str, command: tuple[str, ...] = MANY
+) -> None:
     """Kill processes beside the command while it runs: it goes on."""
-    wanted = _undisturbed(folder, MANY)
-    with started(*MANY, *more, folder=folder) as process:
+    wanted = _undisturbed(folder, command)
+    with started(*command, *more, folder=folder) as process:
         assert eventually(lambda: len(session(process.pid)) > 3), "no workers"
         for _ in range(3):
             time.sleep(rng.uniform(1.0, 4.0))
@@ -90,7 +111,7 @@ def kill_workers(folder: Path, rng: np.random.Generator, counts: Counter[str], *
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(workers[rng.integers(len(workers))], signal.SIGKILL)
         _, said = process.communicate()
-    judge(Said(process.returncode, "", said), MANY, counts)
+    judge(Said(process.returncode, "", said), command, counts)
     counts["! killed worker ends the command"] += process.returncode != 0
     counts["! another payload"] += payloads(folder / "runs/k") != wanted
     shutil.rmtree(folder / "runs/k")
@@ -107,6 +128,19 @@ def _is_worker(number: int) -> bool:
 def kill_dask_workers(folder: Path, rng: np.random.Generator, counts: Counter[str]) -> None:
     """Do so with workers of a local dask cluster."""
     kill_workers(folder, rng, counts, "executor=dask")
+
+
+def kill_study(folder: Path, rng: np.random.Generator, counts: Counter[str]) -> None:
+    """Kill workers of a study on dask, then the study itself: it comes to what it comes to on this machine."""
+    kill_workers(folder, rng, counts, "executor=dask", command=STUDY)
+    wanted = _undisturbed(folder, STUDY)
+    with started(*STUDY, "executor=dask", folder=folder) as process:
+        assert eventually(lambda: any((folder / "runs/k").rglob("manifest.json"))), "no trial is complete"
+        time.sleep(rng.uniform(0.0, 5.0))
+        process.kill()
+        process.communicate()
+        counts["! left running"] += not eventually(lambda: not session(process.pid), seconds=GONE)
+    again(folder, (*STUDY, "executor=dask"), wanted, counts)
 
 
 def kill_scheduler(folder: Path, rng: np.random.Generator, counts: Counter[str]) -> None:
@@ -218,4 +252,5 @@ FAULTS: Mapping[str, Callable[[Path, np.random.Generator, Counter[str]], None]] 
     "interruptions": interrupt,
     "workers of dask killed": kill_dask_workers,
     "scheduler of dask killed": kill_scheduler,
+    "study on dask killed, and its workers": kill_study,
 }

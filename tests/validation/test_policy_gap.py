@@ -167,7 +167,7 @@ def test_a_policy_that_was_stopped_at_its_fall_is_told_apart(arms: Path, monkeyp
     assert comparison["rows"][1]["real"] == {"value": 0.15, "low": None, "high": None, "falls": 1, "episodes": 2}
     assert comparison["never_stopped"]["policies"] == 3
     assert comparison["never_stopped"]["gap"]["after"]["value"] < comparison["gap"]["after"]["value"]
-    assert comparison["caveats"][0].startswith("1 policy was stopped at the first fall in real")
+    assert comparison["caveats"][0].startswith("1 policy was stopped at the first fall on the real side")
     assert "rank correlations" in comparison["caveats"][0]
 
 

@@ -794,10 +794,10 @@ def test_help_is_of_the_world_that_is_typed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("real", "grounded", "line"),
     [
-        ([-50.0, -51.0, -52.0], -50.5, "surely nearer to what it is worth in real"),
-        ([-50.0, -51.0, -52.0], -45.5, "worth in real, and π0 is still surely worth more in it"),
-        ([-50.0, -51.0, -52.0], -56.5, "worth in real, and π0 is still surely worth less in it"),
-        ([-20.0, -21.0, -22.0], -50.5, "surely farther"),
+        ([-50.0, -51.0, -52.0], -50.5, "significantly nearer to what it is worth on the real side"),
+        ([-50.0, -51.0, -52.0], -45.5, "worth on the real side, and π0 is still significantly worth more in it"),
+        ([-50.0, -51.0, -52.0], -56.5, "worth on the real side, and π0 is still significantly worth less in it"),
+        ([-20.0, -21.0, -22.0], -50.5, "significantly farther"),
         ([-50.0, -20.0, -30.0], -35.0, "held-out real episodes do not tell"),
         ([-50.0], -50.5, "is no measure"),
     ],

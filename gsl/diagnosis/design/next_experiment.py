@@ -66,7 +66,7 @@ def next_experiment(findings: Findings, choices: Sequence[Choice]) -> NextExperi
 
     Causes that cannot be told apart come first, then zeros that may be loads, then effects that the log cannot show.
     """
-    unsure = tuple(droop for droop in find_droops(findings) if droop.told)
+    unsure = tuple(droop for droop in find_droops(findings) if droop.separable)
     open_pairs, twins = find_rivals(findings), find_twins(findings)
     if unsure and not open_pairs and not twins:
         return _ladder(unsure, findings)

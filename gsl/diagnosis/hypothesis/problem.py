@@ -148,7 +148,7 @@ class Problem:
         self, candidates: tuple[Candidate, ...], parameters: tuple[np.ndarray, ...], fit: Fit, build: Build
     ) -> Hypothesis:
         z = self.held_out.residual(build(fit.parameters), fit.shifts)
-        used, sample = self.held_out.comparison.used(z.shape[1]), self.held_out.pieces.samples
+        used, sample = self.held_out.comparison.count_residuals(z.shape[1]), self.held_out.pieces.samples
         lost, samples = loss(z), np.unique(sample)
         cost = lost.sum(axis=1)
         costs = np.array([cost[sample == name].sum() for name in samples])

@@ -191,7 +191,11 @@ def _check_beside(batch: Batch, robot: Robot, name: str) -> None:
     """Refuse desired speeds and feed-forward torques far beyond what the joints can do."""
     for group, limit in zip(OTHER_COMMANDS, ("max_velocity", "effort"), strict=True):
         for joint in batch.joints:
-            columns = [one.sensors[key][:-1] for one in batch.episodes if (key := f"{group}.{joint}") in one.sensors]
+            columns = [
+                episode.sensors[key][:-1]
+                for episode in batch.episodes
+                if (key := f"{group}.{joint}") in episode.sensors
+            ]
             reach, most = max((float(np.abs(values).max()) for values in columns), default=0.0), robot.joint(joint)
             if reach > FASTER * getattr(most, limit):
                 problem = f"{group}.{joint} reaches {reach:.4g}, the joint's limit is {getattr(most, limit):.3g}"

@@ -12,6 +12,7 @@ from gsl.core.body import Robot
 from gsl.core.labels import alike
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.records import BASE, Pieces, Record, cut_pieces, to_records
+from gsl.diagnosis.log.repeats import Repeat, find_repeats
 from gsl.diagnosis.log.residual import Comparison, NoiseFloor, compare, noise_floor
 from gsl.diagnosis.settings import LogSettings
 from gsl.errors import InputError
@@ -24,6 +25,7 @@ class Log:
     Attributes:
         robot: Whose log it is.
         records: Its trajectories.
+        repeats: Which motion each of them is of.
         pieces: All windows.
         noise: The noise floor.
         comparison: How replays are compared with it.
@@ -38,6 +40,7 @@ class Log:
 
     robot: Robot
     records: tuple[Record, ...]
+    repeats: tuple[Repeat, ...]
     pieces: Pieces
     noise: NoiseFloor
     comparison: Comparison
@@ -62,7 +65,7 @@ class Log:
     @property
     def motions(self) -> int:
         """Number of different motions: repeats are one."""
-        return len({_command(record) for record in self.records})
+        return len({repeat.motion for repeat in self.repeats})
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -82,7 +85,7 @@ class Log:
     @property
     def used(self) -> np.ndarray:
         """How many residuals of a window count for each channel, shape (n_channels,)."""
-        return self.comparison.used(self.pieces.scored)
+        return self.comparison.count_residuals(self.pieces.scored)
 
     @property
     def shaking_share(self) -> float:
@@ -129,6 +132,7 @@ def cut_log(
     records, order = _sort(to_records(batch, robot, walking=walking))
     if walking and any(record.conditions for record in records):
         raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
+    repeats = tuple(find_repeats(records, period, how.repeats))
     asked = _label_indices(records, held_out or {})
     parts = (how.walk_warm_up, how.walk_scored) if walking else (how.warm_up, how.scored)
     warm_up, scored = (round(part / period) for part in parts)
@@ -136,15 +140,17 @@ def cut_log(
     if walking:
         pieces = pieces.take(spread(np.arange(len(pieces)), how.walk_windows))
         joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
-        noise = noise_floor(records, robot.encoder_step, np.r_[joints, list(how.base_floor)], asked, how.floor)
+        noise = noise_floor(
+            records, repeats, period, robot.encoder_step, np.r_[joints, list(how.base_floor)], asked, how.floor
+        )
         comparison = Comparison.plain(noise.sd)
     else:
-        noise = noise_floor(records, robot.encoder_step, held=asked, settings=how.floor)
+        noise = noise_floor(records, repeats, period, robot.encoder_step, held=asked, settings=how.floor)
         comparison = compare(pieces, noise, len(robot.controlled), how.floor)
-    held, by_record = _hold_out(records, pieces, asked, how.block * scored if blocks else 0)
+    held, by_record = _hold_out(records, repeats, pieces, asked, how.block * scored if blocks else 0)
     train, check = np.flatnonzero(~held), np.flatnonzero(held)
     made_at = _read_step(batch)
-    return Log(robot, records, pieces, noise, comparison, train, check, period, by_record, order, made_at, how)
+    return Log(robot, records, repeats, pieces, noise, comparison, train, check, period, by_record, order, made_at, how)
 
 
 def _read_step(batch: Batch) -> float | None:
@@ -168,23 +174,21 @@ def _name(record: Record) -> str:
     return "" if record.about.get("file") == record.name else record.name
 
 
-def _command(record: Record) -> bytes:
-    """Return what is the same for repeats of one motion."""
-    return np.round(record.commands, 6).tobytes()
-
-
-def _hold_out(records: Sequence[Record], pieces: Pieces, asked: Sequence[int], block: int) -> tuple[np.ndarray, bool]:
+def _hold_out(
+    records: Sequence[Record], repeats: Sequence[Repeat], pieces: Pieces, asked: Sequence[int], block: int
+) -> tuple[np.ndarray, bool]:
     """Hold out what is asked for, else every second motion in the records' order; repeats stay together.
 
     Of motions without names every second block is held out, if blocks have a length [ticks].
     """
     if asked:
         return np.isin(pieces.record, asked), True
-    motions: dict[bytes, int] = {}
-    motion = np.array([motions.setdefault(_command(record), len(motions)) for record in records])
-    if len(motions) > 1 and block and not any(_name(record) for record in records):
-        return (pieces.tick // block + motion[pieces.record]) % 2 == 1, False
-    if len(motions) > 1:
+    motion = np.array([repeat.motion for repeat in repeats])
+    motions = motion.max() + 1
+    if motions > 1 and block and not any(_name(record) for record in records):
+        later = np.array([round(repeat.later) for repeat in repeats])[pieces.record]
+        return ((pieces.tick - later) // block + motion[pieces.record]) % 2 == 1, False
+    if motions > 1:
         return motion[pieces.record] % 2 == 1, True
     return np.arange(len(pieces)) % 2 == 1, False
 

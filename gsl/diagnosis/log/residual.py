@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gsl.diagnosis.log.records import Pieces, Record
+from gsl.diagnosis.log.repeats import Repeat, align_repeats
 from gsl.diagnosis.settings import FloorSettings
 
 SCALE = 5.0  # floors beyond which a residual counts less and less (Cauchy); 2.4 are 95 % efficient for normal noise
@@ -61,6 +62,8 @@ class NoiseFloor:
 
 def noise_floor(
     records: Sequence[Record],
+    repeats: Sequence[Repeat],
+    period: float,
     resolution: float,
     least: np.ndarray | None = None,
     held: Sequence[int] = (),
@@ -70,6 +73,8 @@ def noise_floor(
 
     Args:
         records: All of the log.
+        repeats: Which of them are of the same motion, from `find_repeats`.
+        period: Control period [s].
         resolution: Of the encoders [rad]; the floor is at least what rounding makes, resolution / sqrt(12).
         least: Least floor of each channel instead, shape (n_channels,).
         held: Indices of records that are held out by a label; they are no repeats of the others, whose difference from
@@ -78,9 +83,9 @@ def noise_floor(
     """
     how = settings or FloorSettings()
     least = np.array(max(resolution / np.sqrt(12.0), 1e-5)) if least is None else least
-    groups = [group for group in _repeats(records, held, how) if len(group) > 1]
+    groups = [group for group in _group(records, repeats, held, how) if len(group) > 1]
     if groups:
-        spread = [np.array([record.measured[how.settled :] for record in group]) for group in groups]
+        spread = [align_repeats(group, period)[:, how.settled :] for group in groups]
         square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
         pairs = sum(len(group) - 1 for group in groups)
         samples = sum(part.shape[1] * (len(part) - 1) for part in spread) * len(square)
@@ -105,12 +110,14 @@ def in_blocks(x: np.ndarray) -> np.ndarray:
     return x[:, : rows * BLOCK].reshape(len(x), rows, BLOCK, -1)
 
 
-def _repeats(records: Sequence[Record], held: Sequence[int], how: FloorSettings) -> list[list[Record]]:
-    groups: dict[bytes, list[Record]] = defaultdict(list)
-    for index, record in enumerate(records):
+def _group(
+    records: Sequence[Record], repeats: Sequence[Repeat], held: Sequence[int], how: FloorSettings
+) -> list[list[tuple[Record, float]]]:
+    """Return the records of each motion, and by how many rows each is later; those that are held out apart."""
+    groups: dict[tuple[int, bool], list[tuple[Record, float]]] = defaultdict(list)
+    for index, (record, repeat) in enumerate(zip(records, repeats, strict=True)):
         if len(record) > 2 * how.settled:
-            apart = repr((record.conditions, index in held)).encode()
-            groups[np.round(record.commands, 6).tobytes() + apart].append(record)
+            groups[repeat.motion, index in held].append((record, repeat.later))
     return list(groups.values())
 
 
@@ -166,7 +173,7 @@ class Comparison:
             z[..., self.shaking] = self._of_shaking(sim[..., self.shaking], real[..., self.shaking])
         return np.clip(np.nan_to_num(z, nan=1e3), -1e3, 1e3)
 
-    def used(self, scored: int) -> np.ndarray:
+    def count_residuals(self, scored: int) -> np.ndarray:
         """Return how many residuals of a window count for each joint, shape (n_joints,)."""
         return np.where(self.shaking, scored // BLOCK + BANDS, scored)
 
@@ -177,7 +184,7 @@ class Comparison:
         simulator does not shake.
         """
         mean = cost.mean(axis=0)
-        levels, first = mean.sum(axis=0) / self.used(len(mean)), len(mean) // BLOCK
+        levels, first = mean.sum(axis=0) / self.count_residuals(len(mean)), len(mean) // BLOCK
         band = OF_BAND * mean[first : first + BANDS].max(axis=0)
         return np.where(self.shaking, np.maximum(levels, band), levels)
 

@@ -80,7 +80,7 @@ class Ground:
 
     def suspects(self, scopes: Mapping[str, np.ndarray], settings: SearchSettings) -> list[str]:
         """Return the joints in which most of what calibration leaves lies: there every effect is tried alone."""
-        used = self.bench.comparison.used(self.residual.shape[1]) * len(self.residual)
+        used = self.bench.comparison.count_residuals(self.residual.shape[1]) * len(self.residual)
         excess = np.maximum(0.0, self.costs - used)
         order = np.argsort(excess)[::-1][: settings.suspects]
         joints = {int(np.argmax(mask)): name for name, mask in scopes.items() if mask.sum() == 1}  # joints are last

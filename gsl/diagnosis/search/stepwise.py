@@ -65,9 +65,9 @@ class Selection:
         if hypothesis.cost >= self.chosen.cost or hypothesis.places == self.chosen.places:
             return None
         if any(hypothesis is other for other in self.rejected):
-            return "not surely better than a calibration"
+            return "not significantly better than a calibration"
         if gain(hypothesis, self.chosen).low <= 0.0:
-            return "not surely better"
+            return "not significantly better"
         if not hypothesis.claims_its_names:
             return "a value beyond its documented range"
         return "little gain for another effect" if hypothesis.size > self.chosen.size else None

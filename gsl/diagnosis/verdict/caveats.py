@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.words import several
 from gsl.diagnosis.hypothesis.candidates import Candidate
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
 from gsl.diagnosis.log.records import FEW
@@ -24,6 +25,9 @@ from gsl.diagnosis.simulate.calibration import (
 )
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.diagnosis.verdict.zero_or_load import Droop
+
+LISTED = 3  # joints with their calibration in a sentence, which has to be read
+TOLERANCE = 0.02  # proposed where no law says what is left [rad]
 
 
 def caveats(
@@ -50,7 +54,7 @@ def _droops(unsure: Sequence[Droop]) -> Iterator[str]:
         "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "
         f"by a load or a gain that is off. The fit calls it a zero: {zeros}."
     )
-    if held := ", ".join(droop.joint for droop in unsure if not droop.told):
+    if held := ", ".join(droop.joint for droop in unsure if not droop.separable):
         yield (
             f"No poses of one joint that a ladder may take change gravity enough there to tell: {held}. Turn the base "
             "round, or take poses by hand that a ladder leaves out because limbs might meet."
@@ -83,10 +87,18 @@ def _log(findings: Findings) -> Iterator[str]:
     if tolerance:
         yield f"Differences of {1e3 * tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
     elif findings.verdict.word == "unknown" and findings.verdict.remaining > findings.options.verdict.rough:
-        yield (
-            "What is left is far above the noise, and everything counts as an outlier: say with tolerance=0.02 [rad] "
-            "what does not matter, and the larger causes come out."
-        )
+        yield _ask_for_a_floor(findings)
+
+
+def _ask_for_a_floor(findings: Findings) -> str:
+    """Say how to get a better floor, and propose what even a law of each servo leaves as what does not matter."""
+    log, laws = findings.log, findings.laws
+    left = TOLERANCE if laws is None else float(np.sqrt(np.mean((laws.z * log.comparison.floor) ** 2)))
+    twice = "" if log.noise.source == "repeats" else "record a motion twice, which measures the noise, or "
+    return (
+        f"What is left is far above the noise, so everything counts as an outlier: {twice}say with "
+        f"tolerance={left:.1g} [rad] what does not matter."
+    )
 
 
 def _joints(findings: Findings) -> Iterator[str]:
@@ -107,7 +119,7 @@ def _joints(findings: Findings) -> Iterator[str]:
     if far := out_of_family(findings):
         yield (
             "The calibration of these joints is far from what robots of one make differ by, so that it may hide a "
-            f"cause: {', '.join(far)}."
+            f"cause: {list_first(far)}."
         )
 
 
@@ -115,16 +127,23 @@ def _names(names: Sequence[str], mask: np.ndarray) -> str:
     return ", ".join(name for name, is_so in zip(names, mask, strict=True) if is_so)
 
 
+def list_first(joints: Sequence[str]) -> str:
+    """Return joints with commas between; of many the first ones, for the calibration has them all."""
+    more = len(joints) - LISTED
+    rest = f", and {several(more, 'joint')} more: see the calibration" if more > 0 else ""
+    return ", ".join(joints[:LISTED]) + rest
+
+
 def out_of_family(findings: Findings) -> list[str]:
-    """Return the joints whose calibration is further off than robots of one make differ by, largest shift first."""
+    """Return the joints whose calibration is further off than robots of one make differ by, the farthest first."""
     log, shifts = findings.log, findings.shifts
     off = np.abs(shifts / (findings.simulator.spread * SPREADS[:, None]))
     inertias = inertia_unit(findings.uncalibrated.servo)
     joints = []
-    for k, joint in enumerate(log.joints):
+    for k in np.argsort(-off.max(axis=0), kind="stable"):
         rows = [row for row in np.argsort(-off[:, k]) if off[row, k] >= findings.options.verdict.off]
         parts = [_shift(row, shifts[row, k], log.robot.torque_unit, inertias[k]) for row in rows]
-        joints += [f"{joint} ({', '.join(parts)})"] if parts else []
+        joints += [f"{log.joints[k]} ({', '.join(parts)})"] if parts else []
     return joints
 
 

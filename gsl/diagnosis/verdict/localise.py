@@ -51,7 +51,9 @@ def cells(
     """
     how = settings or LocaliseSettings()
     sample, names = log.pieces.samples, np.unique(log.pieces.samples)
-    alike = z.shape[1] / log.comparison.used(z.shape[1])  # a joint that shakes has fewer residuals in a window
+    alike = z.shape[1] / log.comparison.count_residuals(
+        z.shape[1]
+    )  # a joint that shakes has fewer residuals in a window
     sums = {key: alike * _by_sample(np.where(mask, z**2, 0.0), sample) for key, mask in regimes.items()}
     counts = {key: alike * _by_sample(mask.astype(float), sample) for key, mask in regimes.items()}
     index = np.random.default_rng(0).integers(0, len(names), (how.samples, len(names)))
@@ -123,7 +125,7 @@ def _servos(cut: Pieces, plant: Plant, joints: int) -> np.ndarray:
 
 def _count(log: Log, mask: np.ndarray, key: str) -> np.ndarray:
     """Leave joints that shake in no regime but `all`, and there as many residuals as they have: they are no ticks."""
-    rows = np.arange(mask.shape[1])[:, None] < log.comparison.used(mask.shape[1])
+    rows = np.arange(mask.shape[1])[:, None] < log.comparison.count_residuals(mask.shape[1])
     return mask & (rows if key == "all" else ~log.comparison.shaking)
 
 
@@ -176,7 +178,7 @@ def sides(log: Log, z: np.ndarray, settings: LocaliseSettings | None = None) -> 
         if alike.sum() < how.least:
             continue
         pair = _by_sample(z[alike][..., own] ** 2, log.pieces.take(alike.nonzero()[0]).samples).T
-        counts = log.comparison.used(z.shape[1])[own] * alike.sum()
+        counts = log.comparison.count_residuals(z.shape[1])[own] * alike.sum()
         difference = pair[0] - pair[1]
         flips = np.random.default_rng(0).choice([-1.0, 1.0], (how.samples, len(difference)))
         as_far = int((np.abs(flips @ difference) >= abs(difference.sum()) - 1e-9).sum())

@@ -109,7 +109,8 @@ class Judge:
         worst_joint = chosen.levels.max() / max(1.0, self.expected)
         strange = max(np.log(remaining) / np.log(how.foreign), np.log(worst_joint) / np.log(how.local))
         if not chosen.candidates:
-            word = "unknown" if max(strange, missing) > 1.0 else "no_gap"
+            nothing_left = max(remaining, worst_joint) <= how.beneath
+            word = "unknown" if max(strange, 0.0 if nothing_left else missing) > 1.0 else "no_gap"
             return Verdict(word, (), (), 0.0, remaining, 1.0, how.whole, missing)
         causes = tuple(self._cause(selection, k) for k in range(chosen.size))
         complete = self._completeness(explained, float(strange), missing)

@@ -32,7 +32,7 @@ class Droop:
         ends: Positions of that between which the torque changes most [rad].
         torques: There, of the joint [N·m].
         apart: How far the two explanations are apart between these [rad].
-        told: Whether a ladder of such poses tells them apart.
+        separable: Whether a ladder of such poses tells them apart.
     """
 
     joint: str
@@ -42,7 +42,7 @@ class Droop:
     ends: tuple[float, float]
     torques: tuple[float, float]
     apart: float
-    told: bool
+    separable: bool
 
 
 def find_droops(findings: Findings) -> tuple[Droop, ...]:

@@ -60,13 +60,13 @@ class Audit:
     @property
     def spoils(self) -> bool:
         """Whether a diagnosis would take for physics what is none."""
-        replayed = [one for one in self.signals if one.kind not in BESIDE and not _of_velocity(one)]
+        replayed = [finding for finding in self.signals if finding.kind not in BESIDE and not _of_velocity(finding)]
         return bool(replayed or self.seen or (self.wiring and self.wiring.stands))
 
     @property
     def doubts(self) -> tuple[str, ...]:
         """What a diagnosis of the log has to say beside its own: what spoils no replay, and what looks like physics."""
-        return (*(f"Wiring: {one.sentence}." for one in self.signals), *self.remarks)
+        return (*(f"Wiring: {finding.sentence}." for finding in self.signals), *self.remarks)
 
     @property
     def summary(self) -> str:
@@ -85,7 +85,7 @@ class Audit:
             "verdict": self.verdict,
             "findings": [
                 *map(_signal, self.signals),
-                *(_fault(self, one, None, None, ()) for one in self.seen),
+                *(_fault(self, fault, None, None, ()) for fault in self.seen),
                 *self._stands(),
             ],
             "remarks": list(self.remarks),
@@ -95,7 +95,7 @@ class Audit:
 
     def _stands(self) -> list[dict[str, Any]]:
         stands = self.wiring.stands if self.wiring else ()
-        return [_fault(self, one.fault, one.before, one.after, one.rivals) for one in stands]
+        return [_fault(self, stand.fault, stand.before, stand.after, stand.rivals) for stand in stands]
 
 
 def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> Audit:
@@ -111,7 +111,12 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
     batch = _in_order(batch, robot.controlled)
     signals = check_signals(batch.episodes, batch.joints)
     mended = replace(batch, episodes=tuple(mend_signals(batch.episodes)))
-    spoiled = {joint for one in signals if one.kind in SPOILED and not _of_velocity(one) for joint in one.joints}
+    spoiled = {
+        joint
+        for finding in signals
+        if finding.kind in SPOILED and not _of_velocity(finding)
+        for joint in finding.joints
+    }
     excluded = frozenset(k for k, joint in enumerate(batch.joints) if joint in spoiled)
     wiring, seen, remarks = None, list[Fault](), list[str]()
     if on_ground(batch):
@@ -141,19 +146,21 @@ def _of_velocity(finding: Finding) -> bool:
 
 def take_part(batch: Batch) -> Batch:
     """Return episodes spread over a log, so few that a replay takes no time: wiring is the same in all of them."""
-    most, rows = round(ENOUGH / batch.control_period), [len(one) for one in batch.episodes]
+    most, rows = round(ENOUGH / batch.control_period), [len(episode) for episode in batch.episodes]
     count = max(FEWEST, int(len(rows) * most / max(sum(rows), 1)))
     chosen = [batch.episodes[k] for k in spread(np.arange(len(rows)), count)]
-    return replace(batch, episodes=tuple(_begin(one, most // 2) for one in chosen), metadata={})
+    return replace(batch, episodes=tuple(_begin(episode, most // 2) for episode in chosen), metadata={})
 
 
-def _begin(one: Trajectory, rows: int) -> Trajectory:
+def _begin(episode: Trajectory, rows: int) -> Trajectory:
     """Return the first rows of an episode."""
-    if len(one) <= rows:
-        return one
+    if len(episode) <= rows:
+        return episode
     states = slice(rows + 1)
-    sensors = {key: values[states] for key, values in one.sensors.items()}
-    return Trajectory(one.time[states], one.action[:rows], one.position[states], one.velocity[states], sensors=sensors)
+    sensors = {key: values[states] for key, values in episode.sensors.items()}
+    return Trajectory(
+        episode.time[states], episode.action[:rows], episode.position[states], episode.velocity[states], sensors=sensors
+    )
 
 
 def _in_order(batch: Batch, joints: Sequence[str]) -> Batch:
@@ -164,30 +171,30 @@ def _find_seen(batch: Batch, plant: Plant) -> list[Fault]:
     """Return exchanged joints, signs and units that are seen in how positions follow commands."""
     for fault in permutations(batch):
         return [fault]
-    found = {}
+    faults = {}
     for option in by_relation(batch, plant):
         named = option.kind == "sign" or "unit" in option.value
-        if named and option.kind not in found and (seen := option.fault(range(len(batch.joints)))):
-            found[option.kind] = seen
-    return list(found.values())
+        if named and option.kind not in faults and (seen := option.fault(range(len(batch.joints)))):
+            faults[option.kind] = seen
+    return list(faults.values())
 
 
 def _floors(fit: Fit) -> float:
     return float(np.sqrt((fit.rms**2).mean()))
 
 
-def _signal(one: Finding) -> dict[str, Any]:
+def _signal(finding: Finding) -> dict[str, Any]:
     return {
-        "kind": one.kind,
-        "joints": list(one.joints),
-        "columns": list(one.columns),
+        "kind": finding.kind,
+        "joints": list(finding.joints),
+        "columns": list(finding.columns),
         "side": "",
         "value": {},
-        "episode": one.episode,
-        "row": one.row,
-        "times": one.times,
-        "sentence": f"{one.where}: {one.problem}.",
-        "remedy": f"{one.remedy[0].upper()}{one.remedy[1:]}.",
+        "episode": finding.episode,
+        "row": finding.row,
+        "times": finding.times,
+        "sentence": f"{finding.where}: {finding.problem}.",
+        "remedy": f"{finding.remedy[0].upper()}{finding.remedy[1:]}.",
         "before": None,
         "after": None,
         "or": [],
@@ -213,5 +220,5 @@ def _fault(
         "remedy": remedy(fault, about.joints),
         "before": None if before is None else float(np.sqrt((before.rms[own] ** 2).mean())),
         "after": None if after is None else float(np.sqrt((after.rms[own] ** 2).mean())),
-        "or": [describe(one, about.joints, about.period) for one in rivals],
+        "or": [describe(rival, about.joints, about.period) for rival in rivals],
     }

@@ -51,11 +51,11 @@ class Fault:
 def change_log(batch: Batch, *, action: Change | None = None, position: Change | None = None) -> Batch:
     """Return a log with other commands and positions, each a function of arrays of shape (T, n_joints)."""
 
-    def alter(one: Trajectory) -> Trajectory:
-        commands = action(one.action) if action else one.action
-        return replace(one, action=commands, position=position(one.position) if position else one.position)
+    def alter(episode: Trajectory) -> Trajectory:
+        commands = action(episode.action) if action else episode.action
+        return replace(episode, action=commands, position=position(episode.position) if position else episode.position)
 
-    return replace(batch, episodes=tuple(alter(one) for one in batch.episodes))
+    return replace(batch, episodes=tuple(alter(episode) for episode in batch.episodes))
 
 
 def rescale(
@@ -140,7 +140,7 @@ def rate(factor: float, joints: Sequence[int]) -> Fault:
     """Return the fault of rows that are `factor` times as far apart as the log says."""
 
     def mend(batch: Batch) -> Batch:
-        episodes = tuple(replace(one, time=factor * one.time) for one in batch.episodes)
+        episodes = tuple(replace(episode, time=factor * episode.time) for episode in batch.episodes)
         return replace(batch, episodes=episodes, control_period=factor * batch.control_period)
 
     return Fault("rate", tuple(joints), "", {"factor": factor}, mend)

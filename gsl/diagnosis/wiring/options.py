@@ -112,7 +112,7 @@ def _propose_shares(follows: Relation, clear: np.ndarray, plant: Plant) -> Itera
 def by_range(batch: Batch, plant: Plant) -> Iterator[Spread]:
     """Yield units in which both commands and positions may be: the one follows the other all the same."""
     lower, upper = _limits(plant)
-    values = np.concatenate([np.vstack([one.action, one.position]) for one in batch.episodes])
+    values = np.concatenate([np.vstack([episode.action, episode.position]) for episode in batch.episodes])
     least, most = values.min(axis=0), values.max(axis=0)
     for name, unit in UNITS.items():
         for zero in (0.0, 2048.0) if name == "ticks/4096" else (0.0,):
@@ -139,14 +139,14 @@ def by_range(batch: Batch, plant: Plant) -> Iterator[Spread]:
 def find_beyond(batch: Batch, plant: Plant) -> set[int]:
     """Return the joints whose commands or positions are far beyond their limits: no physics goes there."""
     lower, upper = _limits(plant)
-    values = np.concatenate([np.vstack([one.action, one.position]) for one in batch.episodes])
+    values = np.concatenate([np.vstack([episode.action, episode.position]) for episode in batch.episodes])
     beyond = np.maximum(lower - values.min(axis=0), values.max(axis=0) - upper)
     return set(np.flatnonzero(beyond > BEYOND).tolist())
 
 
 def _limits(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     ranges = [plant.robot.joint(name) for name in plant.robot.controlled]
-    return np.array([one.lower for one in ranges]), np.array([one.upper for one in ranges])
+    return np.array([interval.lower for interval in ranges]), np.array([interval.upper for interval in ranges])
 
 
 def _spread_out(lower: np.ndarray, upper: np.ndarray, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:

@@ -59,10 +59,10 @@ def parameter_bounds(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     """Return the least and the greatest values of the parameters, gains as logarithms, shapes (7, 1)."""
     lower, upper = [], []
     for effect, name in EFFECTS:
-        known = list_documented(effect, plant.robot)[name]
-        assert known.lower is not None and known.upper is not None
-        lower.append(known.lower)
-        upper.append(known.upper)
+        documented = list_documented(effect, plant.robot)[name]
+        assert documented.lower is not None and documented.upper is not None
+        lower.append(documented.lower)
+        upper.append(documented.upper)
     low, high = np.array(lower), np.array(upper)
     high[[KP, KD]] = np.log(np.maximum(high[[KP, KD]], 1.0 / low[[KP, KD]])) + np.log(BEYOND)
     low[[KP, KD]] = np.log(low[[KP, KD]] / BEYOND)

@@ -59,9 +59,9 @@ def relate(episodes: Sequence[Trajectory], period: float) -> Relation:
 
 def _stack(episodes: Sequence[Trajectory], lag: int) -> tuple[np.ndarray, np.ndarray]:
     """Return the commands and the positions `lag` rows after those that they lead to, all episodes below another."""
-    some = [one for one in episodes if len(one) > lag + 2] or list(episodes)
-    action = np.concatenate([one.action[: max(1, len(one) - lag)] for one in some])
-    position = np.concatenate([one.position[min(1 + lag, len(one)) :] for one in some])
+    some = [episode for episode in episodes if len(episode) > lag + 2] or list(episodes)
+    action = np.concatenate([episode.action[: max(1, len(episode) - lag)] for episode in some])
+    position = np.concatenate([episode.position[min(1 + lag, len(episode)) :] for episode in some])
     return action, position
 
 

@@ -146,7 +146,7 @@ class Search:
         leads = sorted(self._others(off, contest.screen()), key=lambda lead: -lead[0])[:LEADS]
         count = contest.count
         for _, lead in leads:
-            fault = self._refined(lead)
+            fault = self._refine(lead)
             after = self._contest(fault).fit(make=True)
             gain = float((fit.cost - after.cost).mean())
             if self._is_physics(fault, after):
@@ -155,7 +155,7 @@ class Search:
                 return Stand(fault, fit, after)
         return None
 
-    def _refined(self, fault: Fault) -> Fault:
+    def _refine(self, fault: Fault) -> Fault:
         """Return gains as a fit has them, which beside those of the menu are others; any other fault as it is."""
         if fault.kind != "gains":
             return fault
@@ -169,8 +169,8 @@ class Search:
             if promising := self._promising(fault, bad, base):
                 yield promising[0], fault
         beyond = find_beyond(self.batch, self.plant)
-        spreads = [(bad, one) for one in by_relation(self.batch, self.plant)]
-        spreads += [([k for k in bad if k in beyond], one) for one in by_range(self.batch, self.plant) if beyond]
+        spreads = [(bad, option) for option in by_relation(self.batch, self.plant)]
+        spreads += [([k for k in bad if k in beyond], option) for option in by_range(self.batch, self.plant) if beyond]
         yield from self._spreads(spreads, base)
 
     def _spreads(
@@ -185,7 +185,7 @@ class Search:
 
     def _others(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
         """Yield faults that a replay alone shows, with by how much they lower the cost."""
-        yield from self._spreads([(bad, one) for one in by_range(self.batch, self.plant)], base)
+        yield from self._spreads([(bad, option) for option in by_range(self.batch, self.plant)], base)
         yield from self._timings(bad, base)
         yield from self._gains(bad, base)
         yield from self._both(bad, base)
@@ -199,7 +199,7 @@ class Search:
 
     def _timings(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
         everyone = range(len(base))
-        rows = min(len(one) for one in self.batch.episodes)
+        rows = min(len(episode) for episode in self.batch.episodes)
         for fault in timings(everyone, rows):
             promising = self._promising(fault, bad, base)
             if promising is None:
@@ -207,7 +207,7 @@ class Search:
             if fault.kind == "rate" or len(promising[1]) >= ALL * len(bad):
                 yield promising[0], fault
             else:
-                alone = next(one for one in timings(promising[1], rows) if one.value == fault.value)
+                alone = next(timing for timing in timings(promising[1], rows) if timing.value == fault.value)
                 yield promising[0], alone
 
     def _gains(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:

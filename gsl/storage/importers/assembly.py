@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,6 +24,7 @@ from gsl.storage.signals.glitches import find_glitches, mend
 
 ARRAYS = (*COMMANDS, "position", "velocity")
 MOST_ROWS, FINER = 100_000, 20  # rows that any resampling may make, and for each row of a larger log
+GAPS = 3  # that a line names
 SENT = ("action", *OTHER_COMMANDS)  # one of them there has to be
 
 
@@ -37,6 +39,7 @@ class Episode:
         steps: From one row of its positions to the next, as logged [s], shape (T,).
         dropped: Rows left out: repeated stamps, and what came before the first command.
         derived: Whether its velocities are slopes of its positions.
+        remarks: On what was left out of the log, and where it was cut; those of a cut log are at its first part.
     """
 
     trajectory: Trajectory
@@ -45,6 +48,7 @@ class Episode:
     steps: np.ndarray
     dropped: int
     derived: bool
+    remarks: tuple[str, ...] = ()
 
 
 def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
@@ -66,18 +70,33 @@ def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
         )
     late = int(np.searchsorted(stamps, commands[0] - SAME))
     own = stamps[late:]
-    cuts = pieces(own, mapping.longest_gap * float(np.median(np.diff(stamps))))
+    period = float(np.median(np.diff(stamps)))
+    cuts = pieces(own, mapping.longest_gap * period)
+    remarks = (*raw.remarks, *_list_gaps(raw.name, own, stamps[0], period, mapping.longest_gap, len(cuts)))
     label = read_label(raw, mapping)
-    found = []
+    lags = []
     for number, cut in enumerate(cuts):
         part = {"part": number + 1} if len(cuts) > 1 else {}
         trajectory = _mend(_trajectory(raw, own[cut], mapping), mapping)
         dropped = raw.dropped + (late if number == 0 else 0)
         derived = "velocity" not in raw.signals
-        found.append(Episode(trajectory, {**label, **part}, raw.joints, np.diff(own[cut]), dropped, derived))
-    if not found:
+        said = remarks if number == 0 else ()
+        lags.append(Episode(trajectory, {**label, **part}, raw.joints, np.diff(own[cut]), dropped, derived, said))
+    if not lags:
         raise InputError(f"{raw.name}: no two rows of positions follow its first command")
-    return found
+    return lags
+
+
+def _list_gaps(name: str, stamps: np.ndarray, start: float, period: float, longest: float, parts: int) -> Iterator[str]:
+    """Tell in one line of holes longer than `longest` periods, with their times from the log's start."""
+    steps = np.diff(stamps)
+    if not len(gaps := np.flatnonzero(steps > longest * period)):
+        return
+    gaps_text = ", ".join(f"{steps[row]:.3g} s after {stamps[row] - start:.6g} s" for row in gaps[:GAPS])
+    more = f" and {len(gaps) - GAPS} more" if len(gaps) > GAPS else ""
+    whole = f"mapping.longest_gap={math.ceil(steps.max() / period) + 1}"
+    cut = f"cut into {parts} episodes" if parts > 1 else "cut to one episode"
+    yield f"{name}: has no row for {gaps_text}{more}, and is {cut}; {whole} keeps it whole"
 
 
 def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory:
@@ -109,14 +128,14 @@ def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory
     return Trajectory(time, action, values["position"], velocity, grounded, sensors=columns)
 
 
-def _mend(one: Trajectory, mapping: LogMapping) -> Trajectory:
+def _mend(episode: Trajectory, mapping: LogMapping) -> Trajectory:
     """Return a trajectory without wraps and glitches, if the mapping says so."""
     if mapping.unwrap:
-        (one,) = join_turns([one])
-    if mapping.glitches == "mend" and len(find_glitches([one], [str(k) for k in range(one.position.shape[1])])):
-        position = mend(one.position)
-        one = replace(one, position=position, velocity=np.gradient(position, one.time, axis=0))
-    return one
+        (episode,) = join_turns([episode])
+    if mapping.glitches == "mend" and len(find_glitches([episode], [str(k) for k in range(episode.position.shape[1])])):
+        position = mend(episode.position)
+        episode = replace(episode, position=position, velocity=np.gradient(position, episode.time, axis=0))
+    return episode
 
 
 def _at(name: str, series: Series, at: np.ndarray) -> np.ndarray:
@@ -133,20 +152,20 @@ def read_label(raw: Raw, mapping: LogMapping) -> dict[str, Any]:
     """
     name = fill(mapping.name, raw.fields, "mapping.name") if mapping.name else raw.name
     about = {key: fill(value, raw.fields, f"mapping.about.{key}") for key, value in mapping.about.items()}
-    known = together(
+    conditions = together(
         effects
         for label, values in mapping.conditions.items()
         for value, effects in values.items()
         if alike(value, about[label])
     )
-    return {**about, "policy": str(name), "file": raw.name, **({"conditions": known} if known else {})}
+    return {**about, "policy": str(name), "file": raw.name, **({"conditions": conditions} if conditions else {})}
 
 
-def list_unmatched(found: Sequence[Episode], mapping: LogMapping) -> Iterator[str]:
+def list_unmatched(episodes: Sequence[Episode], mapping: LogMapping) -> Iterator[str]:
     """Tell of conditions that no episode has: most often a value that is written otherwise."""
     for label, values in mapping.conditions.items():
-        there = [one.label[label] for one in found]
+        there = [episode.label[label] for episode in episodes]
         for value in values:
-            if not any(alike(value, one) for one in there):
-                told = ", ".join(dict.fromkeys(map(str, there)))
-                yield f"mapping.conditions.{label}.{value}: no episode has it; {label} is {told}"
+            if not any(alike(value, label) for label in there):
+                labels = ", ".join(dict.fromkeys(map(str, there)))
+                yield f"mapping.conditions.{label}.{value}: no episode has it; {label} is {labels}"

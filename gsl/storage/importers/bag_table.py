@@ -38,26 +38,26 @@ class BagTable:
 
     def columns(self, wanted: Sequence[str]) -> dict[str, np.ndarray]:
         """Return the wanted fields, a row a message."""
-        found: dict[str, list[Any]] = {name: [] for name in wanted}
+        columns: dict[str, list[Any]] = {name: [] for name in wanted}
         fields = {re.split(r"[.\[]", name, maxsplit=1)[0] for name in wanted}
         with within(f"{self.path}: reading it", seconds=LONG, growth=self.memory):
             for row, (stamp, message) in enumerate(self._messages()):
                 values = {**_flat(message, fields=fields), STAMP: stamp}
-                for name, column in found.items():
+                for name, column in columns.items():
                     if name not in values:
                         raise TrajectoryError(self.path, f"a message on {self.topic} lacks it", column=name, row=row)
                     column.append(values[name])
                 if row % 10_000 == 0:
-                    check_need(self.path, 50.0 * row * len(found), self.memory)
-        return {name: numbers(self.path, name, values) for name, values in found.items()}
+                    check_need(self.path, 50.0 * row * len(columns), self.memory)
+        return {name: numbers(self.path, name, values) for name, values in columns.items()}
 
     def _messages(self) -> Iterator[tuple[float, Any]]:
         anyreader, store = _library(self.path)
         try:
             with anyreader.AnyReader([self.path], default_typestore=store) as bag:
-                chosen = [one for one in bag.connections if one.topic == self.topic]
+                chosen = [connection for connection in bag.connections if connection.topic == self.topic]
                 if not chosen:
-                    there = ", ".join(sorted({one.topic for one in bag.connections})) or "none"
+                    there = ", ".join(sorted({connection.topic for connection in bag.connections})) or "none"
                     raise TrajectoryError(self.path, f"has no topic {self.topic or '(none)'}; its topics are {there}")
                 for connection in chosen:
                     if connection.msgtype not in bag.typestore.fielddefs:
@@ -67,7 +67,8 @@ class BagTable:
         except InputError:
             raise
         except Exception as error:  # a damaged bag ends the reader in many ways
-            raise TrajectoryError(self.path, f"cannot be read as a bag: {' '.join(str(error).split())}") from error
+            problem = f"cannot be read as a bag: {' '.join(str(error).split())}"
+            raise TrajectoryError(self.path, f"{problem}; {_explain_cut(self.path)}") from error
 
 
 def _explain_no_definition(kind: str) -> str:
@@ -76,6 +77,17 @@ def _explain_no_definition(kind: str) -> str:
         f"holds messages of {kind} without their definition; write it as MCAP where the type is installed "
         "(ros2 bag convert), or export the topic as CSV"
     )
+
+
+def _explain_cut(path: Path) -> str:
+    """Return what to type where a bag was never closed."""
+    file = next((file for end in ("mcap", "db3") for file in sorted(path.glob(f"*.{end}"))), path)
+    how = {
+        ".bag": f"rosbag reindex {file}",
+        ".mcap": f"mcap recover {file} -o whole.mcap",
+        ".db3": f"sqlite3 {file} .recover | sqlite3 whole.db3",
+    }.get(file.suffix, f"ros2 bag reindex {file}")
+    return f"copy it again, or if its recorder was killed: {how}"
 
 
 def _library(path: Path) -> tuple[Any, Any]:
@@ -99,12 +111,14 @@ def _flat(message: Any, prefix: str = "", names: Any = None, fields: Collection[
         if hasattr(value, "__dataclass_fields__"):
             values |= _flat(value, f"{path}.", names)
         elif isinstance(value, list) and value and hasattr(value[0], "__dataclass_fields__"):
-            for index, one in enumerate(value):
-                values |= _flat(one, f"{path}[{index}].", names)
+            for index, entry in enumerate(value):
+                values |= _flat(entry, f"{path}[{index}].", names)
         elif isinstance(value, np.ndarray):
             named = isinstance(names, list) and len(names) == len(value)
             values |= (
-                {f"{path}.{name}": float(one) for name, one in zip(names or (), value, strict=False)} if named else {}
+                {f"{path}.{name}": float(number) for name, number in zip(names or (), value, strict=False)}
+                if named
+                else {}
             )
             values[path] = value.tolist()
         elif isinstance(value, bool | int | float):

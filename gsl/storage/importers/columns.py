@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.errors import ConfigError, TrajectoryError
+from gsl.storage.importers.joints import JOINT
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.signal import AXES, PER_JOINT, Signal
 from gsl.storage.importers.table import Table, missing_column
 
 _ENTRY = re.compile(r"(.+)\[(\d+)\]")
-_JOINT = "{joint}"
 
 
 class Reference(NamedTuple):
@@ -22,30 +22,6 @@ class Reference(NamedTuple):
 
     column: str
     entry: int | None = None
-
-
-def joints_of(mapping: LogMapping, table: Table) -> dict[str, str]:
-    """Return the names of the joints in order, each with its name in the log; found by the positions' columns.
-
-    Raises:
-        TrajectoryError: The mapping names none and the table has no such columns.
-    """
-    if isinstance(mapping.joints, dict):
-        return mapping.joints
-    if mapping.joints is not None:
-        return {joint: joint for joint in mapping.joints}
-    form = mapping.signals["position"].column
-    if not (isinstance(form, str) and form.count(_JOINT) == 1):
-        raise ConfigError("mapping.joints", "has no value; name them in order, or say {joint} in the positions' column")
-    before, after = form.split(_JOINT)
-    shortest = len(before) + len(after)
-    fitting = [one for one in table.names if one.startswith(before) and one.endswith(after) and len(one) > shortest]
-    names = [one[len(before) : len(one) - len(after)] for one in fitting]
-    if not names:
-        there = ", ".join(table.names[:12]) or "none"
-        problem = f"is in no column; there is {there}; say in a mapping where things are (docs/howto/own-logs.md)"
-        raise TrajectoryError(table.path, problem, column=form)
-    return {name: name for name in names}
 
 
 def references(
@@ -57,22 +33,22 @@ def references(
         TrajectoryError: The table lacks one.
         ConfigError: A joint has none, or that of another.
     """
-    found = [_reference(one, table) for one in _words(name, signal, joints)]
-    twice = [one for one in found if found.count(one) > 1]
+    references = [_reference(word, table) for word in _words(name, signal, joints)]
+    twice = [reference for reference in references if references.count(reference) > 1]
     if twice and name in PER_JOINT:
         problem = f"is that of several joints for {name}; every joint has one of its own"
         raise ConfigError(f"mapping.signals.{name}.column", problem, given=_describe(twice[0]))
-    for reference in found:
+    for reference in references:
         if reference.column not in table.names:
             raise missing_column(table, reference.column, others)
-    return found
+    return references
 
 
 def list_columns(mapping: LogMapping, joints: Mapping[str, str], file: str) -> set[str]:
     """Return the columns that the mapping names of a file."""
     own = {name: signal for name, signal in mapping.signals.items() if signal.file == file}
     words = {word for name, signal in own.items() for word in _words(name, signal, joints)}
-    return words | {mapping.time.column, mapping.episode} | {one.time for one in own.values()}
+    return words | {mapping.time.column, mapping.episode} | {signal.time for signal in own.values()}
 
 
 def _words(name: str, signal: Signal, joints: Mapping[str, str]) -> list[str]:
@@ -83,10 +59,10 @@ def _words(name: str, signal: Signal, joints: Mapping[str, str]) -> list[str]:
             raise ConfigError(f"mapping.signals.{name}.column", f"has no value for {', '.join(lacking)}")
         return [str(column[key]) for key in keys]
     if isinstance(column, list):
-        return [str(one) for one in column]
-    if _JOINT in str(column) or "{index}" in str(column):
+        return [str(cell) for cell in column]
+    if JOINT in str(column) or "{index}" in str(column):
         pairs = enumerate(joints.values())
-        return [str(column).replace(_JOINT, old).replace("{index}", str(index)) for index, old in pairs]
+        return [str(column).replace(JOINT, old).replace("{index}", str(index)) for index, old in pairs]
     return [str(column)]
 
 
@@ -100,23 +76,23 @@ def _describe(reference: Reference) -> str:
 
 
 def side_by_side(
-    name: str, found: Sequence[Reference], values: Mapping[str, np.ndarray], joints: Sequence[str], table: Table
+    name: str, references: Sequence[Reference], values: Mapping[str, np.ndarray], joints: Sequence[str], table: Table
 ) -> np.ndarray:
     """Return a signal's raw values, shape (T, 1), (T, n_axes) or (T, n_joints).
 
     Raises:
         TrajectoryError: They are no numbers, or not one a joint or an axis.
     """
-    parts = [_part(table, reference, values[reference.column]) for reference in found]
+    parts = [_part(table, reference, values[reference.column]) for reference in references]
     raw = np.hstack(parts)
     due = len(joints) if name in PER_JOINT else len(AXES[name]) if name in AXES else 0
     fits = raw.shape[1] == due if due else raw.shape[1] in (1, len(joints))
     if not fits:
         what = f"{due} {'joints' if name in PER_JOINT else 'axes'}" if due else f"1 or {len(joints)} are due"
-        one = f"{found[0].column}[3]" if len(found) == 1 and raw.shape[1] > 1 else "a column for each"
-        how = f"name each by its number from 0, such as {one}" if "[" in one else f"name {one} in the mapping"
+        advice = f"{references[0].column}[3]" if len(references) == 1 and raw.shape[1] > 1 else "a column for each"
+        how = f"name each by its number from 0, such as {advice}" if "[" in advice else f"name {advice} in the mapping"
         problem = f"{raw.shape[1]} values a row for {name}, but {what}; {how}"
-        raise TrajectoryError(table.path, problem, column=found[0].column)
+        raise TrajectoryError(table.path, problem, column=references[0].column)
     return raw
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
+from gsl.core.budget import check_file
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import ArrayTable
 from gsl.storage.importers.bag_table import BagTable
@@ -41,15 +42,18 @@ def table(path: Path, *, topic: str, records: str, memory: float, entry: Entry |
     """
     if entry is not None:
         return EpisodeTable(entry, memory)
+    for file in [path] if not path.is_dir() else path.iterdir():
+        if not file.is_dir():
+            check_file(file)  # before anything opens it
     if is_bag(path):
         return BagTable(path, topic, memory)
     if path.is_dir():
         return ArrayTable(path, NpyFolder(path), memory)
     if not path.stat().st_size:
         raise TrajectoryError(path, "is empty; log it again")
-    found = _reader(path, records, memory)()
-    check_columns(path, found.names)
-    return found
+    table = _reader(path, records, memory)()
+    check_columns(path, table.names)
+    return table
 
 
 def _reader(path: Path, records: str, memory: float) -> Callable[[], Table]:

@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.budget import COLUMNS, DEPTH
+from gsl.core.budget import COLUMNS, DEPTH, check_file
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
+from gsl.storage.importers.sizes import DAMAGED
 
 MAGIC = b"\x89HDF\r\n\x1a\n"
 CHUNK = 256_000_000  # bytes of what is unpacked at once; common ones have one million
@@ -30,16 +31,16 @@ def is_hdf5(path: Path) -> bool:
 def list_groups(path: Path, pattern: str) -> list[str]:
     """Return the groups whose path fits a pattern such as data/demo_*, in the order of their numbers."""
     parts = pattern.strip("/").split("/")
-    with _opened(path) as file:
-        found = [""]
+    with _open(path) as file:
+        paths = [""]
         for part in parts:
             below = [
-                (before, name) for before in found for name in _names(file, before) if fnmatch.fnmatchcase(name, part)
+                (before, name) for before in paths for name in _names(file, before) if fnmatch.fnmatchcase(name, part)
             ]
-            found = [f"{before}/{name}".strip("/") for before, name in below]
-    if not found:
+            paths = [f"{before}/{name}".strip("/") for before, name in below]
+    if not paths:
         raise TrajectoryError(path, f"has no group {pattern}")
-    return sorted(found, key=lambda name: (len(name), name))
+    return sorted(paths, key=lambda name: (len(name), name))
 
 
 class Hdf5Arrays:
@@ -47,25 +48,25 @@ class Hdf5Arrays:
 
     def __init__(self, path: Path, group: str, *, turned: bool = False) -> None:
         self.path, self.group, self.turned = path, group.strip("/"), turned
-        with _opened(path) as file:
+        with _open(path) as file:
             root = _at(file, self.group)
             if root is None:
                 there = ", ".join(_names(file, "")) or "nothing"
                 raise TrajectoryError(path, f"has no group {group}; it has {there}")
-            found = dict(_data_sets(root))
+            sets = dict(_data_sets(root))
             self.fields: Mapping[str, Any] = dict(_attributes(root))
-        self.shapes: Shapes = {name: (_turn(shape) if turned else shape, kind) for name, (shape, kind) in found.items()}
+        self.shapes: Shapes = {name: (_turn(shape) if turned else shape, kind) for name, (shape, kind) in sets.items()}
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return arrays by path."""
-        with _opened(self.path) as file:
+        with _open(self.path) as file:
             root = _at(file, self.group)
             for name in names:
                 if math.prod(root[name].chunks or ()) * root[name].dtype.itemsize > CHUNK:
                     problem = f"is stored in chunks of more than {CHUNK / 1e6:g} MB; store it in smaller ones"
                     raise TrajectoryError(self.path, problem, column=name)
             values = {name: np.asarray(root[name][()]) for name in names}
-        return {name: one.T.reshape(_turn(one.shape)) if self.turned else one for name, one in values.items()}
+        return {name: array.T.reshape(_turn(array.shape)) if self.turned else array for name, array in values.items()}
 
 
 def _turn(shape: tuple[int, ...]) -> tuple[int, ...]:
@@ -74,22 +75,23 @@ def _turn(shape: tuple[int, ...]) -> tuple[int, ...]:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def _open(path: Path) -> Iterator[Any]:
     try:
         import h5py
     except ImportError as error:
         raise InputError(f"{path}: HDF5 files are read with the library h5py: pip install 'gsl[hdf5]'") from error
     try:
+        check_file(path)
         file = h5py.File(path, "r")
     except OSError as error:
-        raise TrajectoryError(path, "is no HDF5 file, or truncated or damaged; copy it again") from error
+        raise TrajectoryError(path, f"is no HDF5 file, or {DAMAGED}") from error
     try:
         with file:
             yield file
     except InputError:
         raise
     except Exception as error:  # a damaged file ends the library in many ways
-        raise TrajectoryError(path, "is truncated or damaged; copy it again") from error
+        raise TrajectoryError(path, f"is {DAMAGED}") from error
 
 
 def _names(file: Any, group: str) -> list[str]:
@@ -122,11 +124,13 @@ def _data_sets(group: Any, prefix: str = "", depth: int = 0) -> Iterator[tuple[s
             raise TrajectoryError(group.file.filename, f"holds more than {COLUMNS:,} arrays in a group, or is too deep")
         if not isinstance(group.get(name, getlink=True), h5py.HardLink):
             continue
-        one = group[name]
-        if isinstance(one, h5py.Group):
-            yield from _data_sets(one, f"{prefix}{name}/", depth + 1)
-        elif isinstance(one, h5py.Dataset) and one.shape is not None and not (one.is_virtual or one.external):
-            yield f"{prefix}{name}", (one.shape, one.dtype)
+        member = group[name]
+        if isinstance(member, h5py.Group):
+            yield from _data_sets(member, f"{prefix}{name}/", depth + 1)
+        elif (
+            isinstance(member, h5py.Dataset) and member.shape is not None and not (member.is_virtual or member.external)
+        ):
+            yield f"{prefix}{name}", (member.shape, member.dtype)
 
 
 def _attributes(group: Any) -> Iterator[tuple[str, Any]]:

@@ -45,16 +45,16 @@ class JsonTable:
         """Return the wanted columns."""
         if self.rows is None and not self.lines:
             return {name: numbers(self.path, name, _at(self.place, name)) for name in wanted}
-        found: dict[str, list[Any]] = {name: [] for name in wanted}
+        columns: dict[str, list[Any]] = {name: [] for name in wanted}
         for row, record in enumerate(_records(self.path, self.memory) if self.lines else self.rows or []):
-            for name, values in found.items():
+            for name, values in columns.items():
                 value = _at(record, name)
                 if value is None and name not in _flat(record):
                     raise TrajectoryError(self.path, "is missing here", column=name, row=row)
                 values.append(value)
             if row % 10_000 == 0:
-                check_need(self.path, 50.0 * row * len(found), self.memory)
-        return {name: numbers(self.path, name, values) for name, values in found.items()}
+                check_need(self.path, 50.0 * row * len(columns), self.memory)
+        return {name: numbers(self.path, name, values) for name, values in columns.items()}
 
 
 def _document(path: Path, memory: float) -> Any:
@@ -67,18 +67,20 @@ def _records(path: Path, memory: float) -> Iterator[Any]:
     with open_log(path, most=100.0 * memory, lines=True) as file:
         for number, line in enumerate(file, 1):
             if line.strip():
-                yield _parse(path, line, number)
+                yield _parse(path, line, number - 1)
 
 
-def _parse(path: Path, text: bytes, line: int | None) -> Any:
+def _parse(path: Path, text: bytes, row: int | None) -> Any:
     try:
         return json.loads(text)
     except (ValueError, RecursionError) as error:
-        where = (
-            f"line {error.lineno}: {error.msg}" if isinstance(error, json.JSONDecodeError) else "not text, or too deep"
-        )
+        where = "not text, or too deep"
+        if isinstance(error, json.JSONDecodeError):
+            where = f"line {error.lineno}: {error.msg}" if row is None else error.msg
         more = "; one record a line is a .jsonl" if "Extra data" in where else ""
-        raise TrajectoryError(path, f"is not JSON ({where}){more}", line=line) from error
+        if row is None and not text.rstrip().endswith((b"]", b"}")):
+            more = "; it is cut off, as that of a killed logger is: copy it again, or log a record a line (.jsonl)"
+        raise TrajectoryError(path, f"is not JSON ({where}){more}", row=row) from error
 
 
 def _at(value: Any, name: str) -> Any:
@@ -96,7 +98,7 @@ def _flat(value: Any, prefix: str = "") -> dict[str, Any]:
     if not isinstance(value, dict):
         return {prefix: value}
     return {
-        key: one for name, part in value.items() for key, one in _flat(part, f"{prefix}.{name}".lstrip(".")).items()
+        key: leaf for name, part in value.items() for key, leaf in _flat(part, f"{prefix}.{name}".lstrip(".")).items()
     }
 
 

@@ -19,14 +19,14 @@ def find_label_columns(
     mapping: LogMapping, fields: Mapping[str, Any], tables: Mapping[str, Table]
 ) -> dict[str, list[str]]:
     """Return for each file the columns that name an episode or say something of it; single values go first."""
-    texts = [one for one in (mapping.name, *mapping.about.values()) if isinstance(one, str)]
+    texts = [text for text in (mapping.name, *mapping.about.values()) if isinstance(text, str)]
     asked = dict.fromkeys(field for text in texts for field in _FIELD.findall(text))
-    found: dict[str, list[str]] = {}
+    columns: dict[str, list[str]] = {}
     for role, table in tables.items():
-        before = {name for names in found.values() for name in names}
+        before = {name for names in columns.values() for name in names}
         free = [name for name in asked if name not in fields and name not in before and name != mapping.episode]
-        found[role] = [name for name in free if name in table.names]
-    return found
+        columns[role] = [name for name in free if name in table.names]
+    return columns
 
 
 def constant(table: Table, name: str, values: np.ndarray, rows: np.ndarray) -> Any:

@@ -13,7 +13,7 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
 from gsl.effects.effect import build
 from gsl.errors import ConfigError
-from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, Signal, Time
+from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, SHORTEST, Signal, Time
 from gsl.storage.importers.units import factor
 from gsl.storage.trajectory_contract import INTEGERS, UNITS, suggestion
 
@@ -30,16 +30,16 @@ def _time(value: Any) -> Time:
 def _joints(value: Any) -> Any:
     """Return names of joints as texts, where some are whole numbers."""
 
-    def text(one: Any) -> Any:
-        return str(one) if isinstance(one, int) and not isinstance(one, bool) else one
+    def text(entry: Any) -> Any:
+        return str(entry) if isinstance(entry, int) and not isinstance(entry, bool) else entry
 
     if isinstance(value, dict):
-        return {text(name): text(one) for name, one in value.items()}
-    return [text(one) for one in value] if isinstance(value, list) else value
+        return {text(name): text(entry) for name, entry in value.items()}
+    return [text(entry) for entry in value] if isinstance(value, list) else value
 
 
 def _signals(value: Any) -> dict[str, Signal]:
-    return {str(name): _signal(one, f"signals.{name}") for name, one in _dictionary(value, "signals").items()}
+    return {str(name): _signal(signal, f"signals.{name}") for name, signal in _dictionary(value, "signals").items()}
 
 
 def _signal(value: Any, where: str) -> Signal:
@@ -82,7 +82,9 @@ class Mapping:
     episode: Annotated[str, setting("file, or the column whose value tells episodes apart", min_length=1)] = "file"
     records: Annotated[str, setting("JSON: path of the list of rows; HDF5: a group, or data/demo_* for many")] = ""
     time: Annotated[Time, setting("the stamps: {column, unit}, or {period}"), BeforeValidator(_time)] = Time()  # noqa: RUF009  it is frozen
-    period: Annotated[float | None, setting("resample to it; null keeps the rows as they are", unit="s", gt=0)] = None
+    period: Annotated[
+        float | None, setting("resample to it; null keeps the rows as they are", unit="s", ge=SHORTEST)
+    ] = None
     command_offset: Annotated[float, setting("what the commands' clock is ahead of the sensors'", unit="s")] = 0.0
     synchronised: Annotated[bool, setting("whether commands and sensors share a clock, or the offset is known")] = True
     longest_gap: Annotated[float, setting("periods without a row, above which an episode is cut in two", gt=1)] = 10.0
@@ -122,11 +124,11 @@ class Mapping:
                 raise ConfigError("files", "must be names or patterns of files below the source", given=pattern or "''")
         if self.files == {}:
             raise ConfigError("files", "names no file of an episode; leave it out, or say which there are")
-        for label, known in self.conditions.items():
+        for label, values in self.conditions.items():
             if label not in self.about:
-                given = ", ".join(self.about) or "nothing"
-                raise ConfigError(f"conditions.{label}", f"`about` says nothing of it; it says {given}")
-            for value, effects in known.items():
+                labels = ", ".join(self.about) or "nothing"
+                raise ConfigError(f"conditions.{label}", f"`about` says nothing of it; it says {labels}")
+            for value, effects in values.items():
                 _check_effects(f"conditions.{label}.{value}", effects)
         for name, signal in self.signals.items():
             self._check_file(f"signals.{name}.file", signal.file)
@@ -137,7 +139,7 @@ class Mapping:
     def turning(self) -> list[str]:
         """Joints of which it says one by one that their positions are in radians, however far they turn."""
         unit = self.signals["position"].unit
-        return [joint for joint, one in unit.items() if one == "rad"] if isinstance(unit, dict) else []
+        return [joint for joint, name in unit.items() if name == "rad"] if isinstance(unit, dict) else []
 
     def check_joints(self, joints: Sequence[str]) -> None:
         """Refuse what is said of joints that a log does not have.
@@ -192,11 +194,11 @@ def _of_other_kind(unit: str) -> str:
 
 def _check_keys(where: str, name: str, signal: Signal, joints: Sequence[str] | None) -> None:
     """Refuse what is said of an axis or a joint that is none; nothing where the joints are not known yet."""
-    known, what = (AXES[name], "axis") if name in AXES else (joints, "joint")
-    if known is None:
+    names, what = (AXES[name], "axis") if name in AXES else (joints, "joint")
+    if names is None:
         return
     for key in BY_NAME:
         value = getattr(signal, key)
-        for one in value if isinstance(value, dict) else ():
-            if one not in known:
-                raise ConfigError(f"{where}.{key}.{one}", f"is no {what}{did_you_mean(one, known)}")
+        for entry in value if isinstance(value, dict) else ():
+            if entry not in names:
+                raise ConfigError(f"{where}.{key}.{entry}", f"is no {what}{did_you_mean(entry, names)}")

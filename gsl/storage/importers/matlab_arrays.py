@@ -12,7 +12,7 @@ import numpy as np
 from gsl.core.budget import DEPTH, within
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
-from gsl.storage.importers.sizes import check_need
+from gsl.storage.importers.sizes import DAMAGED, check_need
 
 NUMBER = 8.0  # bytes of one, the most
 
@@ -33,12 +33,12 @@ class MatlabArrays:
         except InputError:
             raise
         except Exception as error:  # a damaged file ends the reader in many ways
-            raise TrajectoryError(path, "is no MATLAB file, or truncated or damaged; save it again") from error
-        leaves = dict(_leaves({name: one for name, one in saved.items() if not name.startswith("__")}))
-        self.arrays = {name: one for name, one in leaves.items() if isinstance(one, np.ndarray) and one.ndim}
-        self.shapes: Shapes = {name: (one.shape, one.dtype) for name, one in self.arrays.items()}
+            raise TrajectoryError(path, f"is no MATLAB file, or {DAMAGED}") from error
+        leaves = dict(_leaves({name: value for name, value in saved.items() if not name.startswith("__")}))
+        self.arrays = {name: leaf for name, leaf in leaves.items() if isinstance(leaf, np.ndarray) and leaf.ndim}
+        self.shapes: Shapes = {name: (array.shape, array.dtype) for name, array in self.arrays.items()}
         self.fields: Mapping[str, Any] = {
-            name: one for name, one in leaves.items() if isinstance(one, str | int | float | bool)
+            name: leaf for name, leaf in leaves.items() if isinstance(leaf, str | int | float | bool)
         }
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
@@ -47,8 +47,8 @@ class MatlabArrays:
 
 
 def _leaves(value: dict[str, Any], prefix: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:
-    for name, one in value.items() if depth < DEPTH else ():
-        if isinstance(one, dict):
-            yield from _leaves(one, f"{prefix}{name}.", depth + 1)
+    for name, entry in value.items() if depth < DEPTH else ():
+        if isinstance(entry, dict):
+            yield from _leaves(entry, f"{prefix}{name}.", depth + 1)
         else:
-            yield f"{prefix}{name}", one.item() if isinstance(one, np.generic) else one
+            yield f"{prefix}{name}", entry.item() if isinstance(entry, np.generic) else entry

@@ -16,6 +16,7 @@ from numpy.lib import format as npy
 from gsl.core.budget import COLUMNS, HEADER_BYTES
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.array_table import Shapes
+from gsl.storage.importers.sizes import DAMAGED
 
 END = ".npy"
 _DAMAGED = (OSError, EOFError, zipfile.BadZipFile, zlib.error, struct.error)
@@ -35,7 +36,7 @@ class NpzArrays:
                     info.filename.removesuffix(END): _header(archive, info, path) for info in members
                 }
         except (*_DAMAGED, RuntimeError) as error:  # the last: encrypted, or packed in a way unknown
-            raise TrajectoryError(path, "is no npz archive, or truncated or damaged; copy it again") from error
+            raise TrajectoryError(path, f"is no npz archive, or {DAMAGED}") from error
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return arrays by name."""

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from gsl.errors import TrajectoryError
-from gsl.storage.importers.sizes import check_need
+from gsl.storage.importers.sizes import DAMAGED, check_need
 from gsl.storage.importers.table import numbers
 from gsl.storage.parquet import count_bytes
 
@@ -43,7 +43,7 @@ class ParquetTable:
                 check_need(self.path, need, self.memory)
                 table = file.read(columns=list(wanted))
         except (pa.ArrowException, OSError) as error:
-            raise TrajectoryError(self.path, "is truncated or damaged; copy it again") from error
+            raise TrajectoryError(self.path, f"is {DAMAGED}") from error
         if not table.num_rows:
             raise TrajectoryError(self.path, "has no rows; log it again")
         return {name: convert(self.path, name, table.column(name)) for name in wanted}
@@ -61,7 +61,7 @@ def names_of(path: Path) -> list[str]:
     try:
         return list(pq.read_schema(path).names)
     except (pa.ArrowException, OSError) as error:
-        raise TrajectoryError(path, "is not a parquet file, or truncated or damaged; copy it again") from error
+        raise TrajectoryError(path, f"is not a parquet file, or {DAMAGED}") from error
 
 
 def convert(path: Path, name: str, column: pa.ChunkedArray) -> np.ndarray:

@@ -67,20 +67,20 @@ def places(source: str, files: str | Mapping[str, str] | None, records: str = ""
 
 
 def _places(source: str, files: str | Mapping[str, str] | None, records: str) -> list[Place]:
-    base, found = _find(source)
+    base, paths = _find(source)
     if isinstance(files, Mapping):
-        return [one for folder in _folders(source, found, files) for one in _several(base, folder, files)]
-    chosen = sorted({one for path in found for one in _within(path, files)})
+        return [place for folder in _folders(source, paths, files) for place in _several(base, folder, files)]
+    chosen = sorted({file for path in paths for file in _within(path, files)})
     if not chosen:
-        raise InputError(_nothing(source, found, files))
+        raise InputError(_nothing(source, paths, files))
     return [place for path in chosen for place in _apart(Place(stem(_relative(path, base)), {"": path}), records)]
 
 
-def _nothing(source: str, found: list[Path], pattern: str | None) -> str:
+def _nothing(source: str, paths: list[Path], pattern: str | None) -> str:
     """Return what to say where no file fits: that there are some further down, if there are."""
     wanted = pattern or f"file that ends with {', '.join(ENDS)}"
     below = f"**/{pattern or '*'}"
-    there = [one for path in found if path.is_dir() for one in _fitting(path, below)]
+    there = [file for path in paths if path.is_dir() for file in _fitting(path, below)]
     if not there:
         return f"{source}: holds no {wanted}"
     deeper = f"{len(there)} in folders below, such as {os.path.relpath(there[0])}"
@@ -106,10 +106,10 @@ def _find(source: str) -> tuple[Path, list[Path]]:
         raise InputError(f"source = {source}: is no plain file")
     if path.is_symlink():
         raise InputError(f"source = {source}: is a link that leads nowhere")
-    found = [Path(one) for one in sorted(glob.glob(source, recursive=True))]
-    if not found:
+    paths = [Path(path) for path in sorted(glob.glob(source, recursive=True))]
+    if not paths:
         raise InputError(f"source = {source}: there is no such file, folder or pattern")
-    return Path(re.split(r"[*?\[]", source)[0]).parent if found else path, found
+    return Path(re.split(r"[*?\[]", source)[0]).parent if paths else path, paths
 
 
 def _within(path: Path, pattern: str | None) -> Iterator[Path]:
@@ -119,19 +119,19 @@ def _within(path: Path, pattern: str | None) -> Iterator[Path]:
 
 
 def _fitting(folder: Path, pattern: str) -> list[Path]:
-    below = sorted(one for one in folder.glob(pattern) if readable(one) and not _is_hidden(one, folder))
-    whole = {one for one in below if one.is_dir()}
-    return [one for one in below if not whole.intersection(one.parents)]
+    below = sorted(path for path in folder.glob(pattern) if readable(path) and not _is_hidden(path, folder))
+    whole = {path for path in below if path.is_dir()}
+    return [path for path in below if not whole.intersection(path.parents)]
 
 
 def _is_hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
 
 
-def _folders(source: str, found: list[Path], files: Mapping[str, str]) -> list[Path]:
+def _folders(source: str, paths: list[Path], files: Mapping[str, str]) -> list[Path]:
     """Return the folders that hold an episode's files."""
     first = next(iter(files.values()))
-    folders = sorted({one.parent for path in found if path.is_dir() for one in path.rglob(first)})
+    folders = sorted({file.parent for path in paths if path.is_dir() for file in path.rglob(first)})
     if not folders:
         named = " and ".join(files.values())
         raise InputError(f"{source}: the mapping wants folders with {named}, and there is none with {first}")
@@ -146,7 +146,7 @@ def _several(base: Path, folder: Path, files: Mapping[str, str]) -> list[Place]:
     if all(len(own) == 1 for own in fitting.values()):
         return [Place(name, {role: own[0] for role, own in fitting.items()})]
     if all(pattern.count("*") == 1 and "/" not in pattern for pattern in files.values()):
-        apart = {role: {_star(one.name, files[role]): one for one in own} for role, own in fitting.items()}
+        apart = {role: {_star(file.name, files[role]): file for file in own} for role, own in fitting.items()}
         keys = sorted({key for own in apart.values() for key in own})
         for key in keys:
             for role, pattern in files.items():
@@ -155,9 +155,9 @@ def _several(base: Path, folder: Path, files: Mapping[str, str]) -> list[Place]:
                     raise InputError(f"{folder}: there is no {due}, which the mapping wants as the {role} of {key}")
         return [Place(f"{name}/{key}", {role: own[key] for role, own in apart.items()}) for key in keys]
     role, own = next((role, own) for role, own in fitting.items() if len(own) != 1)
-    told = f"{len(own)} files are called {files[role]}" if own else f"there is no {files[role]}"
+    problem = f"{len(own)} files are called {files[role]}" if own else f"there is no {files[role]}"
     how = "; one * in the name of every role pairs files by what it stands for" if own else ""
-    raise InputError(f"{folder}: {told}, which the mapping wants as its {role}{how}")
+    raise InputError(f"{folder}: {problem}, which the mapping wants as its {role}{how}")
 
 
 def _star(name: str, pattern: str) -> str:

@@ -9,12 +9,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.errors import ConfigError, TrajectoryError
-from gsl.storage.importers.columns import Reference, joints_of, list_columns, output_names, references, side_by_side
+from gsl.storage.importers.columns import Reference, list_columns, output_names, references, side_by_side
 from gsl.storage.importers.formats import table
+from gsl.storage.importers.joints import joints_of, list_left_out
 from gsl.storage.importers.labels import constant, find_label_columns
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
 from gsl.storage.importers.signal import AXES, BESIDE, BY_NAME, COMMANDS, FLAGS, Signal
+from gsl.storage.importers.sizes import OPEN_END, find_open_line
 from gsl.storage.importers.stamps import order_rows, seconds
 from gsl.storage.importers.table import Table, missing_column
 from gsl.storage.trajectory_contract import UNITS
@@ -47,6 +49,7 @@ class Raw:
         signals: By the contract's name.
         fields: What its files and its path say once.
         dropped: Rows left out because their stamp had come before.
+        remarks: On columns that were left out.
     """
 
     name: str
@@ -54,6 +57,7 @@ class Raw:
     signals: Mapping[str, Series]
     fields: Mapping[str, Any]
     dropped: int
+    remarks: tuple[str, ...] = ()
 
 
 def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[Raw]:
@@ -74,40 +78,49 @@ def raw_episodes(place: Place, mapping: LogMapping, memory: float) -> Iterator[R
 
 def _in_lines(error: TrajectoryError, tables: Iterable[Table]) -> TrajectoryError:
     """Return an error with the line of its row, as an editor counts, where the file has one row a line."""
-    first = next((one.first_line for one in tables if one.path == error.path), None)
-    if first is None or error.row is None:
+    first = next((table.first_line for table in tables if table.path == error.path), None)
+    line = error.line if first is None or error.row is None else error.row + first
+    if line is None:
         return error
-    return TrajectoryError(error.path, error.problem, column=error.column, line=error.row + first)
+    cut = f"; {OPEN_END}" if line == find_open_line(error.path) else ""
+    return TrajectoryError(error.path, f"{error.problem}{cut}", column=error.column, line=line)
 
 
 def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) -> Iterator[Raw]:
-    joints = joints_of(mapping, tables[mapping.signals["position"].file])
+    joints = joints_of(mapping, tables)
     mapping.check_joints(list(joints))
-    named = {name: one for name, one in mapping.signals.items() if _there(name, one, joints, tables)}
+    remarks = tuple(list_left_out(mapping, joints, tables))
+    named = {name: signal for name, signal in mapping.signals.items() if _there(name, signal, joints, tables)}
     others = {role: list_columns(mapping, joints, role) for role in tables}
-    found = {name: references(name, one, joints, tables[one.file], others[one.file]) for name, one in named.items()}
-    fields = {name: value for one in tables.values() for name, value in one.fields.items()}
+    references_of = {
+        name: references(name, signal, joints, tables[signal.file], others[signal.file])
+        for name, signal in named.items()
+    }
+    fields = {name: value for table in tables.values() for name, value in table.fields.items()}
     fields |= {FILE: place.name, **fields_of(place.name, mapping.path)}
-    told = find_label_columns(mapping, fields, tables)
-    values = {role: _columns(one, role, mapping, named, found, told[role]) for role, one in tables.items()}
+    label_columns = find_label_columns(mapping, fields, tables)
+    values = {
+        role: _columns(table, role, mapping, named, references_of, label_columns[role])
+        for role, table in tables.items()
+    }
     for key, rows in _groups(values, mapping, tables):
         own = {**fields, **({mapping.episode: key} if key is not None else {})}
         for role, own_rows in rows.items():
-            cells = {column: values[role][column][own_rows] for column in told[role]}
+            cells = {column: values[role][column][own_rows] for column in label_columns[role]}
             own |= {column: constant(tables[role], column, part, own_rows) for column, part in cells.items()}
         name = place.name if key is None else f"{place.name}/{key}"
         signals, dropped = {}, 0
-        for signal, one in named.items():
-            reading = _Reading(signal, one, found[signal], tables[one.file], rows[one.file], mapping)
-            if one.optional and reading.is_empty(values[one.file]):
+        for signal, spec in named.items():
+            reading = _Reading(signal, spec, references_of[signal], tables[spec.file], rows[spec.file], mapping)
+            if spec.optional and reading.is_empty(values[spec.file]):
                 continue
-            series, twice = reading.series(values[one.file], tuple(joints))
+            series, twice = reading.series(values[spec.file], tuple(joints))
             signals[signal], dropped = series, max(dropped, twice)
-        yield Raw(name, tuple(joints), signals, own, dropped)
+        yield Raw(name, tuple(joints), signals, own, dropped, remarks)
 
 
 def _tables(place: Place, mapping: LogMapping, memory: float) -> dict[str, Table]:
-    roles = dict.fromkeys(one.file for one in mapping.signals.values())
+    roles = dict.fromkeys(signal.file for signal in mapping.signals.values())
     return {
         role: table(
             place.files.get(role) or place.files[""],
@@ -130,31 +143,31 @@ def _there(name: str, signal: Signal, joints: Mapping[str, str], tables: Mapping
 
 
 def _columns(
-    one: Table,
+    table: Table,
     role: str,
     mapping: LogMapping,
     named: Mapping[str, Signal],
-    found: Mapping[str, Sequence[Reference]],
-    told: Sequence[str],
+    references_of: Mapping[str, Sequence[Reference]],
+    lengths_text: Sequence[str],
 ) -> dict[str, np.ndarray]:
     """Return all columns that are needed of a file, read once."""
     signals = [name for name, signal in named.items() if signal.file == role]
-    wanted = [reference.column for name in signals for reference in found[name]]
+    wanted = [reference.column for name in signals for reference in references_of[name]]
     if mapping.time.period is None:
         wanted += [named[name].time or mapping.time.column for name in signals]
     if mapping.episode != FILE:
         wanted.append(mapping.episode)
-    wanted += told
+    wanted += lengths_text
     for name in wanted:
-        if name not in one.names:
-            raise missing_column(one, name)
-    values = one.columns(list(dict.fromkeys(wanted)))
+        if name not in table.names:
+            raise missing_column(table, name)
+    values = table.columns(list(dict.fromkeys(wanted)))
     lengths = {name: len(column) for name, column in values.items()}
     if len(set(lengths.values())) > 1:
-        told = ", ".join(f"{name} {length}" for name, length in lengths.items())
-        raise TrajectoryError(one.path, f"its columns are of different lengths: {told}")
+        lengths_text = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise TrajectoryError(table.path, f"its columns are of different lengths: {lengths_text}")
     if not min(lengths.values()):
-        raise TrajectoryError(one.path, "has no rows; log it again")
+        raise TrajectoryError(table.path, "has no rows; log it again")
     return values
 
 
@@ -183,14 +196,14 @@ class _Reading(NamedTuple):
 
     name: str
     signal: Signal
-    found: Sequence[Reference]
+    references: Sequence[Reference]
     table: Table
     rows: np.ndarray
     mapping: LogMapping
 
     def series(self, values: Mapping[str, np.ndarray], joints: tuple[str, ...]) -> tuple[Series, int]:
         """Return the signal and the number of rows that were left out."""
-        raw = side_by_side(self.name, self.found, values, joints, self.table)[self.rows]
+        raw = side_by_side(self.name, self.references, values, joints, self.table)[self.rows]
         stamps = seconds(self.table.path, self._stamps(values), self.mapping.time, self._column())
         keep = self._find_filled(raw)
         stamps, raw, rows = stamps[keep], raw[keep], self.rows[keep]
@@ -204,12 +217,12 @@ class _Reading(NamedTuple):
         gains, offsets = np.array([self.signal.scale(key, wanted) for key in self._keys(len(names), joints)]).T
         if self.name in (*COMMANDS, *BESIDE):
             stamps = stamps - self.mapping.command_offset
-        return Series(stamps, self.signal.signed(raw) * gains + offsets, tuple(names)), int(np.sum(~keep))
+        return Series(stamps, self.signal.apply_sign(raw) * gains + offsets, tuple(names)), int(np.sum(~keep))
 
     def is_empty(self, values: Mapping[str, np.ndarray]) -> bool:
         """Tell whether no row has a number: a logger that keeps a column for what it cannot measure."""
-        own = [values[reference.column][self.rows] for reference in self.found]
-        return all(one.dtype.kind == "f" and not np.isfinite(one).any() for one in own)
+        own = [values[reference.column][self.rows] for reference in self.references]
+        return all(column.dtype.kind == "f" and not np.isfinite(column).any() for column in own)
 
     def _keys(self, width: int, joints: Sequence[str]) -> Sequence[str]:
         """Return the joint or axis of each column; none of a signal that is one for all joints."""
@@ -236,7 +249,7 @@ class _Reading(NamedTuple):
             return ~empty
         if self.mapping.blanks == "refuse" or np.isinf(raw).any() or empty.all():
             row = int(np.argmax(empty))
-            column = self.found[int(np.argmax(wrong[row])) if len(self.found) > 1 else 0].column
+            column = self.references[int(np.argmax(wrong[row])) if len(self.references) > 1 else 0].column
             mend = "drop or mend the row, or say mapping.blanks=skip if it means no news"
             if empty.all():
                 mend = f"no row has one; leave {self.name} out of the mapping, or say optional: true"

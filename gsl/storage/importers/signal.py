@@ -15,6 +15,8 @@ from gsl.storage.importers.units import factor
 Columns = str | int | list[str | int] | dict[str, str | int]
 Values = float | dict[str, float]
 
+SHORTEST = 1e-6
+"""Period of a log [s]; no robot is read a million times a second, and the rate of a shorter one may be no number."""
 BESIDE = (*OTHER_COMMANDS, "kp_command", "kd_command")  # of a servo that takes more than a position
 PER_JOINT = ("action", "grounded_action", "position", "velocity", "torque", "temperature", *BESIDE)
 COMMANDS = ("action", "grounded_action")
@@ -37,7 +39,9 @@ class Time:
     wrap: Annotated[
         float | None, setting("what the stamps count to before they begin again, such as 4294967296", gt=0)
     ] = None
-    period: Annotated[float | None, setting("instead of stamps: time from one row to the next", unit="s", gt=0)] = None
+    period: Annotated[
+        float | None, setting("instead of stamps: time from one row to the next", unit="s", ge=SHORTEST)
+    ] = None
 
     def __post_init__(self) -> None:
         """Refuse a unit that is none of time."""
@@ -69,7 +73,7 @@ class Signal:
         if any(abs(sign) != 1.0 for sign in signs):
             raise ConfigError("sign", "must be 1 or -1; a scale is factor", given=str(self.sign))
 
-    def signed(self, raw: np.ndarray) -> np.ndarray:
+    def apply_sign(self, raw: np.ndarray) -> np.ndarray:
         """Return raw values with the sign that the upper half of the numbers of `bits` stands for."""
         turn = 2.0**self.bits
         return np.where(raw >= turn / 2.0, raw - turn, raw) if self.bits else raw

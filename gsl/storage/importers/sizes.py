@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import gzip
 import io
 import zlib
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
@@ -18,6 +18,9 @@ LONGEST_LINE = 4_000_000
 FEW, PACKED = 2e8, 100.0
 """Bytes that come out of any packed file, and for one of a larger file: text of logs packs by 10."""
 PICKLE = b"\x80"
+DAMAGED = "truncated or damaged; copy it again, or log it again if its logger was killed"
+OPEN_END = "the file ends within this line, as that of a killed logger does: delete the line"
+PIECE = 1_000_000  # bytes that are read at once where lines are counted
 
 
 def check_need(path: Path, need: float, memory: float) -> None:
@@ -27,7 +30,7 @@ def check_need(path: Path, need: float, memory: float) -> None:
         raise TrajectoryError(path, f"{problem}; cut it into several files, or say memory={1.1 * need / GB:.2g}")
 
 
-@contextmanager
+@contextlib.contextmanager
 def open_log(path: Path, *, most: float, lines: bool = False) -> Iterator[IO[bytes]]:
     """Open a file for reading, unpacked if its name ends with gz.
 
@@ -51,10 +54,26 @@ def open_log(path: Path, *, most: float, lines: bool = False) -> Iterator[IO[byt
             if start == PICKLE:
                 raise TrajectoryError(path, "is a Python pickle, which can run code: none is read; export it as CSV")
             yield reader
-    except (gzip.BadGzipFile, EOFError, zlib.error) as error:
+    except EOFError as error:
+        problem = "is cut off, as that of a killed logger is; copy it again, or unpack what is whole with zcat"
+        raise TrajectoryError(path, problem) from error
+    except (gzip.BadGzipFile, zlib.error) as error:
         raise TrajectoryError(path, "is no gzip file, or truncated or damaged; copy it again") from error
     except OSError as error:
         raise TrajectoryError(path, f"cannot be read: {error.strerror or error}") from error
+
+
+def find_open_line(path: Path) -> int | None:
+    """Return the number of a text file's last line, from 1, if that does not end as lines do; else None.
+
+    A disk that lost its power pads with zeros.
+    """
+    count, last = 1, b"\n"
+    with path.open("rb") as raw, contextlib.suppress(OSError, EOFError, zlib.error):
+        source = gzip.GzipFile(fileobj=raw) if path.name.endswith(".gz") else raw
+        while piece := source.read(PIECE):
+            count, last = count + piece.count(b"\n"), piece[-1:]
+    return None if last in b"\r\n" else count
 
 
 class _Counted(io.RawIOBase):

@@ -50,7 +50,9 @@ def look_at(source: str, mapping: LogMapping, memory: float) -> Source:
         if mapping.signals["position"].column == PLAIN:
             mapping, notes = own_mapping(data, mapping, memory)
         name = folder.resolve().name
-        return Source([Place(f"{name}/{one.name}", {"": one.file}, one) for one in data.episodes], mapping, notes)
+        return Source(
+            [Place(f"{name}/{episode.name}", {"": episode.file}, episode) for episode in data.episodes], mapping, notes
+        )
     _check_plain(source, mapping)
     return Source(places(source, mapping.files, mapping.records), mapping, [])
 
@@ -62,14 +64,14 @@ def list_files(source: str, mapping: LogMapping, memory: float) -> Mapping[str, 
         return {path.relative_to(folder).as_posix(): path for path in open_data_set(folder, memory).files}
     _check_plain(source, mapping)
     paths = {
-        f"{one.name}/{role}".rstrip("/"): path
-        for one in places(source, mapping.files, mapping.records)
-        for role, path in one.files.items()
+        f"{place.name}/{role}".rstrip("/"): path
+        for place in places(source, mapping.files, mapping.records)
+        for role, path in place.files.items()
     }
     return {
         name if file == path else f"{name}/{file.name}": file
         for name, path in paths.items()
-        for file in ([path] if path.is_file() else sorted(one for one in path.iterdir() if one.is_file()))
+        for file in ([path] if path.is_file() else sorted(file for file in path.iterdir() if file.is_file()))
     }
 
 
@@ -81,7 +83,7 @@ def _check_plain(source: str, mapping: LogMapping) -> None:
     inside = find_data_set(Path(source) / "x")
     if inside is not None and mapping.signals["position"].column == PLAIN:
         raise InputError(f"source = {source}: is a part of a LeRobot data set; say source={_short(inside)}, its folder")
-    if sets := sorted(one.parents[1] for one in Path(source).glob(f"*/{INFO}")):
+    if sets := sorted(info.parents[1] for info in Path(source).glob(f"*/{INFO}")):
         problem = (
             f"holds {len(sets)} LeRobot data sets; say one" if len(sets) > 1 else "holds a LeRobot data set; say it"
         )

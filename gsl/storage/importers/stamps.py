@@ -36,7 +36,7 @@ def seconds(path: Path, stamps: np.ndarray, time: Time, column: str) -> np.ndarr
 
 def _dates(path: Path, stamps: np.ndarray, column: str) -> np.ndarray:
     try:
-        words = stamps if stamps.dtype.kind == "M" else np.array([str(one).removesuffix("Z") for one in stamps])
+        words = stamps if stamps.dtype.kind == "M" else np.array([str(stamp).removesuffix("Z") for stamp in stamps])
         return words.astype("datetime64[ns]").astype(np.int64).astype(np.float64) * 1e-9
     except ValueError as error:
         raise TrajectoryError(path, f"holds no dates: {error}", column=column) from error

@@ -40,31 +40,37 @@ class Suspicion(NamedTuple):
 
 
 def suspicions(
-    found: Sequence[Episode], lags: Sequence[Sequence[Lag]], turning: Collection[str] = ()
+    episodes: Sequence[Episode], lags: Sequence[Sequence[Lag]], turning: Collection[str] = ()
 ) -> list[Suspicion]:
     """Return all of them.
 
     Args:
-        found: Trajectories of the same joints.
+        episodes: Trajectories of the same joints.
         lags: Of each trajectory and joint, from command to position.
         turning: Joints of which the mapping says that they are in radians however far they turn.
     """
-    joints = found[0].joints
-    told = [*_time(found), *_order(found, lags), *_suspect_exchange(found)]
+    joints = episodes[0].joints
+    suspicions = [*_time(episodes), *_order(episodes, lags), *_suspect_exchange(episodes)]
     for index, joint in enumerate(joints):
-        told += _joint(joint, index, found, endless=joint in turning)
-    seen = {one.column for one in told}
-    signals = check_signals([one.trajectory for one in found], joints)
-    said = [one for one in signals if not (len(one.columns) == 1 and one.columns[0] in seen)]
-    return [*told, *(Suspicion(one.where, f"{one.problem}; {one.remedy}", one.kind in SENSELESS) for one in said)]
+        suspicions += _joint(joint, index, episodes, endless=joint in turning)
+    seen = {suspicion.column for suspicion in suspicions}
+    signals = check_signals([episode.trajectory for episode in episodes], joints)
+    said = [finding for finding in signals if not (len(finding.columns) == 1 and finding.columns[0] in seen)]
+    return [
+        *suspicions,
+        *(
+            Suspicion(finding.where, f"{finding.problem}; {finding.remedy}", finding.kind in SENSELESS)
+            for finding in said
+        ),
+    ]
 
 
 def lags_of(episode: Episode) -> list[Lag]:
     """Return how far each joint's position comes after its command; zero where the command does not move."""
-    one = episode.trajectory
-    moving = [float(np.ptp(command)) > MOVES for command in one.action.T]
-    pairs = zip(one.action.T, one.position[:-1].T, moving, strict=True)
-    return [lag(command, position, one.time[:-1]) if moves else NONE for command, position, moves in pairs]
+    trajectory = episode.trajectory
+    moving = [float(np.ptp(command)) > MOVES for command in trajectory.action.T]
+    pairs = zip(trajectory.action.T, trajectory.position[:-1].T, moving, strict=True)
+    return [lag(command, position, trajectory.time[:-1]) if moves else NONE for command, position, moves in pairs]
 
 
 def measure_saturation(values: np.ndarray, command: np.ndarray) -> float:
@@ -94,25 +100,25 @@ def measure_stops(position: np.ndarray, command: np.ndarray) -> float:
     return max(float(np.mean(there)) for there in ends)
 
 
-def _all(found: Sequence[Episode], name: str, index: int) -> np.ndarray:
-    rows = [getattr(one.trajectory, name)[:, index][: len(one.trajectory)] for one in found]
+def _all(episodes: Sequence[Episode], name: str, index: int) -> np.ndarray:
+    rows = [getattr(episode.trajectory, name)[:, index][: len(episode.trajectory)] for episode in episodes]
     return np.concatenate(rows)
 
 
-def _time(found: Sequence[Episode]) -> Iterator[Suspicion]:
-    steps = [float(np.median(one.steps)) for one in found]
+def _time(episodes: Sequence[Episode]) -> Iterator[Suspicion]:
+    steps = [float(np.median(episode.steps)) for episode in episodes]
     if max(steps) > SLOWEST or min(steps) < FASTEST:
         problem = f"rows are {max(steps):.3g} s apart; is time: {{unit: ...}} right? Stamps are taken to be in it"
         yield Suspicion("time", problem, True)
 
 
-def _order(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> Iterator[Suspicion]:
+def _order(episodes: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> Iterator[Suspicion]:
     """Tell of positions that come before their commands."""
-    least = 0.5 * min(float(np.median(one.steps)) for one in found)
-    clear = [one for row in lags for one in row if is_clear(one)]
-    early = [one for one in clear if one.seconds < -least]
-    if early and sum(one.contrast for one in early) > MOSTLY * sum(one.contrast for one in clear):
-        typical = 1e3 * -float(np.median([one.seconds for one in early]))
+    least = 0.5 * min(float(np.median(episode.steps)) for episode in episodes)
+    clear = [lag for row in lags for lag in row if is_clear(lag)]
+    early = [lag for lag in clear if lag.seconds < -least]
+    if early and sum(lag.contrast for lag in early) > MOSTLY * sum(lag.contrast for lag in clear):
+        typical = 1e3 * -float(np.median([lag.seconds for lag in early]))
         problem = (
             f"comes {typical:.0f} ms before action: are the columns of commands and measurements swapped, or is the "
             "commands' clock ahead (mapping.command_offset)?"
@@ -120,48 +126,53 @@ def _order(found: Sequence[Episode], lags: Sequence[Sequence[Lag]]) -> Iterator[
         yield Suspicion("position", problem, True)
 
 
-def _suspect_exchange(found: Sequence[Episode]) -> Iterator[Suspicion]:
+def _suspect_exchange(episodes: Sequence[Episode]) -> Iterator[Suspicion]:
     """Tell of positions that follow another joint's command and not their own."""
-    joints = found[0].joints
-    for joint, other in find_exchanges([one.trajectory for one in found]).items():
+    joints = episodes[0].joints
+    for joint, other in find_exchanges([episode.trajectory for episode in episodes]).items():
         problem = f"follows action.{joints[other]} and not action.{joints[joint]}: are the columns of joints swapped?"
         yield Suspicion(f"position.{joints[joint]}", problem, True)
 
 
-def find_exchanges(found: Sequence[Trajectory]) -> dict[int, int]:
+def find_exchanges(trajectories: Sequence[Trajectory]) -> dict[int, int]:
     """Return for each joint whose position is another's that other joint; episodes of like commands say nothing."""
-    told = {}
-    for joint in range(found[0].action.shape[1]):
-        own = [_likeness(one, joint, joint) for one in found]
-        unlike = [one for one, alike in zip(found, own, strict=True) if alike < UNLIKE]
-        votes = np.zeros(found[0].action.shape[1], dtype=int)
+    exchanges = {}
+    for joint in range(trajectories[0].action.shape[1]):
+        own = [_likeness(trajectory, joint, joint) for trajectory in trajectories]
+        unlike = [trajectory for trajectory, alike in zip(trajectories, own, strict=True) if alike < UNLIKE]
+        votes = np.zeros(trajectories[0].action.shape[1], dtype=int)
         for other in set(range(len(votes))) - {joint}:
             votes[other] = sum(
-                _likeness(one, other, joint) > FOLLOWS and _likeness(one, other, other) < FOLLOWS for one in unlike
+                _likeness(trajectory, other, joint) > FOLLOWS and _likeness(trajectory, other, other) < FOLLOWS
+                for trajectory in unlike
             )  # where the other joint follows its own command as well, two commands are nearly equal, or one is a copy
         best = int(np.argmax(votes))
-        like = [one for one, alike in zip(found, own, strict=True) if alike > FOLLOWS] if votes[best] else []
-        contrary = sum(_likeness(one, best, joint) < UNLIKE for one in like)
+        like = (
+            [trajectory for trajectory, alike in zip(trajectories, own, strict=True) if alike > FOLLOWS]
+            if votes[best]
+            else []
+        )
+        contrary = sum(_likeness(trajectory, best, joint) < UNLIKE for trajectory in like)
         if votes[best] and votes[best] >= AGAINST * contrary:
-            told[joint] = best
-    return told
+            exchanges[joint] = best
+    return exchanges
 
 
-def _likeness(one: Trajectory, command: int, measured: int) -> float:
+def _likeness(trajectory: Trajectory, command: int, measured: int) -> float:
     """Return how much like a joint's command a position is; 0 where the command rests or it moves much less far."""
-    action, position = one.action[:, command], one.position[:-1, measured]
+    action, position = trajectory.action[:, command], trajectory.position[:-1, measured]
     if np.ptp(action) < MOVES or (command != measured and np.std(position) < AS_FAR * np.std(action)):
         return 0.0
-    return likeness(action, position, one.time[:-1])
+    return likeness(action, position, trajectory.time[:-1])
 
 
-def is_clear(one: Lag) -> bool:
+def is_clear(lag: Lag) -> bool:
     """Tell whether a lag can be believed: slow or periodic motions, and friction, leave many that do as well."""
-    return one.correlation > ALIKE and one.contrast > CONTRAST
+    return lag.correlation > ALIKE and lag.contrast > CONTRAST
 
 
-def _joint(joint: str, index: int, found: Sequence[Episode], *, endless: bool) -> Iterator[Suspicion]:
-    action, position, velocity = (_all(found, name, index) for name in ("action", "position", "velocity"))
+def _joint(joint: str, index: int, episodes: Sequence[Episode], *, endless: bool) -> Iterator[Suspicion]:
+    action, position, velocity = (_all(episodes, name, index) for name in ("action", "position", "velocity"))
     for name, values in (("action", action), ("position", position)):
         reach = float(np.abs(values).max())
         if reach > FAR and not endless:
@@ -171,7 +182,7 @@ def _joint(joint: str, index: int, found: Sequence[Episode], *, endless: bool) -
             yield Suspicion(f"{name}.{joint}", f"reaches {reach:.4g} rad; {asked}", True)
             return
     yield from _ratio(joint, action, position)
-    slopes = [np.gradient(one.trajectory.position[:, index], one.trajectory.time) for one in found]
+    slopes = [np.gradient(episode.trajectory.position[:, index], episode.trajectory.time) for episode in episodes]
     size = max(float(np.sqrt(np.mean(np.concatenate(slopes) ** 2))), SLOW)
     if (own := float(np.sqrt(np.mean(velocity**2)))) > FASTER * size:
         problem = f"is {own / size:.3g} times the slope of position.{joint}; is it in deg/s or ticks/s?"
@@ -187,7 +198,7 @@ def _ratio(joint: str, action: np.ndarray, position: np.ndarray) -> Iterator[Sus
         return
     a, b = action - action.mean(), position - position.mean()
     ratio, alike = float(np.std(b) / np.std(a)), float(np.mean(a * b) / (np.std(a) * np.std(b)))
-    if abs(alike) > ALIKE and any(DEGREES[0] < one < DEGREES[1] for one in (ratio, 1.0 / ratio)):
+    if abs(alike) > ALIKE and any(DEGREES[0] < scale < DEGREES[1] for scale in (ratio, 1.0 / ratio)):
         which = "position" if ratio > 1.0 else "action"
         other = "action" if ratio > 1.0 else "position"
         problem = f"moves {max(ratio, 1.0 / ratio):.3g} times as far as {other}.{joint}; is it in degrees (unit: deg)?"

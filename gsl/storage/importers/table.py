@@ -58,17 +58,17 @@ def numbers(path: Path, name: str, values: Sequence[Any]) -> np.ndarray:
         return np.array(values, dtype=object)
     filled = [np.nan if value is None else value for value in values]
     try:
-        found = np.array(filled)
+        numbers = np.array(filled)
     except ValueError:
-        found = np.array(None)
-    if found.dtype.kind in "buif" and found.ndim in (1, 2):
-        return found
+        numbers = np.array(None)
+    if numbers.dtype.kind in "buif" and numbers.ndim in (1, 2):
+        return numbers
     first = _shape(filled[0]) if filled else None
     for row, value in enumerate(filled):
         shape = _shape(value)
         if isinstance(value, str | dict) or shape is None or shape != first:
-            told = str(value) if len(str(value)) <= 40 else f"{str(value)[:37]}..."
-            raise TrajectoryError(path, f"{told} is not a number, or not as long as the first", column=name, row=row)
+            shown = str(value) if len(str(value)) <= 40 else f"{str(value)[:37]}..."
+            raise TrajectoryError(path, f"{shown} is not a number, or not as long as the first", column=name, row=row)
     raise TrajectoryError(path, "holds no numbers", column=name)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from gsl.core.budget import DEPTH, within
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.array_table import Shapes
-from gsl.storage.importers.sizes import check_need
+from gsl.storage.importers.sizes import DAMAGED, check_need
 
 _DAMAGED = (RuntimeError, OSError, EOFError, ValueError, KeyError, AttributeError, AssertionError, IndexError)
 
@@ -35,21 +35,23 @@ class TensorArrays:
             problem = "holds more than tensors (a pickle, which can run code): none is read; save a dict of tensors"
             raise TrajectoryError(path, problem) from error
         except _DAMAGED as error:
-            raise TrajectoryError(path, "is no file of torch.save, or truncated or damaged; copy it again") from error
+            raise TrajectoryError(path, f"is no file of torch.save, or {DAMAGED}") from error
         leaves = dict(_leaves(saved if isinstance(saved, dict) else {"tensor": saved}))
         dense = {
-            name: one
-            for name, one in leaves.items()
-            if isinstance(one, torch.Tensor) and one.layout == torch.strided and not (one.is_quantized or one.is_meta)
+            name: leaf
+            for name, leaf in leaves.items()
+            if isinstance(leaf, torch.Tensor)
+            and leaf.layout == torch.strided
+            and not (leaf.is_quantized or leaf.is_meta)
         }
-        self.tensors = {name: one.detach() for name, one in dense.items()}
+        self.tensors = {name: tensor.detach() for name, tensor in dense.items()}
         self.shapes: Shapes = {
-            name: (tuple(one.shape), np.dtype(str(one.dtype).removeprefix("torch.")))
-            for name, one in self.tensors.items()
-            if one.dtype in _plain()
+            name: (tuple(tensor.shape), np.dtype(str(tensor.dtype).removeprefix("torch.")))
+            for name, tensor in self.tensors.items()
+            if tensor.dtype in _plain()
         }
         self.fields: Mapping[str, Any] = {
-            name: one for name, one in leaves.items() if isinstance(one, str | int | float | bool)
+            name: leaf for name, leaf in leaves.items() if isinstance(leaf, str | int | float | bool)
         }
 
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
@@ -79,8 +81,8 @@ def _plain() -> set[Any]:
 
 
 def _leaves(value: dict[Any, Any], prefix: str = "", depth: int = 0) -> Iterator[tuple[str, Any]]:
-    for name, one in value.items() if depth < DEPTH else ():
-        if isinstance(one, dict):
-            yield from _leaves(one, f"{prefix}{name}.", depth + 1)
+    for name, entry in value.items() if depth < DEPTH else ():
+        if isinstance(entry, dict):
+            yield from _leaves(entry, f"{prefix}{name}.", depth + 1)
         else:
-            yield f"{prefix}{name}", one
+            yield f"{prefix}{name}", entry

@@ -24,6 +24,7 @@ CELLS = 2_000_000  # read at once
 FACTOR = 100.0  # bytes of text that may be read for one of memory: only the wanted columns stay
 BLANKS = r"\s+"
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+")
+_OPEN_QUOTE = re.compile(r"EOF inside string starting at row (\d+)")
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|")
 
 
@@ -73,8 +74,11 @@ class TextTable:
             except pd.errors.EmptyDataError:
                 return
             except (pd.errors.ParserError, pd.errors.ParserWarning) as error:
-                told = " ".join(str(error).split()).removeprefix("Error tokenizing data. C error: ")
-                raise TrajectoryError(self.path, f"has rows of another length than its header: {told}") from error
+                problem = " ".join(str(error).split()).removeprefix("Error tokenizing data. C error: ")
+                if quote := _OPEN_QUOTE.fullmatch(problem):
+                    row = int(quote[1]) - int(self.header)
+                    raise TrajectoryError(self.path, "has a quote that does not end", row=row) from error
+                raise TrajectoryError(self.path, f"has rows of another length than its header: {problem}") from error
             except UnicodeDecodeError as error:
                 raise TrajectoryError(self.path, "is no text; which format is it?") from error
 
@@ -115,16 +119,16 @@ def _values(path: Path, name: str, column: pd.Series, first: int) -> np.ndarray:
     if cells and cells[0].startswith("["):
         return _vectors(path, name, cells, first)
     words = {"true": 1.0, "false": 0.0, "": np.nan}
-    found = []
+    lines = []
     for row, cell in enumerate(cells):
         value = words.get(cell.lower())
         try:
-            found.append(float(cell) if value is None else value)
+            lines.append(float(cell) if value is None else value)
         except ValueError:
             if row == 0 and all(cells):
                 return np.array(cells, dtype=object)
-            raise TrajectoryError(path, f"{cell[:40]!r} is not a number", column=name, row=first + row) from None
-    return np.array(found)
+            raise TrajectoryError(path, f"{cell[:20]!r} is not a number", column=name, row=first + row) from None
+    return np.array(lines)
 
 
 def _vectors(path: Path, name: str, cells: list[str], first: int) -> np.ndarray:

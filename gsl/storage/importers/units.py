@@ -10,18 +10,19 @@ from gsl.core.validation import did_you_mean
 
 DEGREE, TURN, GRAVITY = math.pi / 180.0, 2.0 * math.pi, 9.80665
 _ANGLES = {"rad": 1.0, "mrad": 1e-3, "deg": DEGREE, "turn": TURN}
+_WAYS = {"m": 1.0, "mm": 1e-3}  # the contract has m for rad, and N for N·m, of joints that slide
 FACTORS: Mapping[str, Mapping[str, float]] = {
-    "rad": _ANGLES,
-    "rad/s": {**{f"{name}/s": factor for name, factor in _ANGLES.items()}, "rpm": TURN / 60.0},
+    "rad": {**_ANGLES, **_WAYS},
+    "rad/s": {**{f"{name}/s": factor for name, factor in {**_ANGLES, **_WAYS}.items()}, "rpm": TURN / 60.0},
     "s": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9},
-    "N·m": {"Nm": 1.0, "mNm": 1e-3, "kgcm": GRAVITY / 100.0},
-    "N·m/rad": {"Nm/rad": 1.0, "Nm/deg": 1.0 / DEGREE},
-    "N·m·s/rad": {"Nms/rad": 1.0, "Nms/deg": 1.0 / DEGREE},
+    "N·m": {"Nm": 1.0, "mNm": 1e-3, "kgcm": GRAVITY / 100.0, "N": 1.0},
+    "N·m/rad": {"Nm/rad": 1.0, "Nm/deg": 1.0 / DEGREE, "N/m": 1.0},
+    "N·m·s/rad": {"Nms/rad": 1.0, "Nms/deg": 1.0 / DEGREE, "Ns/m": 1.0},
     "V": {"V": 1.0, "mV": 1e-3},
     "°C": {"degC": 1.0},
     "m/s²": {"m/s²": 1.0, "g": GRAVITY},
     "N": {"N": 1.0},
-    "m": {"m": 1.0, "mm": 1e-3},
+    "m": _WAYS,
     "m/s": {"m/s": 1.0, "mm/s": 1e-3},
     "1": {"1": 1.0},
 }
@@ -47,11 +48,11 @@ def factor(unit: str, wanted: str) -> float:
     name = unit.replace("·", "").replace("*", "").replace(" ", "").replace("µ", "u").replace("μ", "u")
     name = name.replace("^2", "²")
     name = _SPELLINGS.get(name, name)
-    known = FACTORS[wanted]
-    if name in known:
-        return known[name]
+    factors = FACTORS[wanted]
+    if name in factors:
+        return factors[name]
     ticks = _TICKS.fullmatch(name)
     if ticks and int(ticks.group(1)) and wanted == ("rad/s" if ticks.group(2) else "rad"):
         return TURN / int(ticks.group(1))
     more = {"rad": ["ticks/4096"], "rad/s": ["ticks/4096/s"]}.get(wanted, [])
-    raise ValueError(f"is no unit for what is in {wanted}{did_you_mean(unit, [*known, *more], listed=True)}")
+    raise ValueError(f"is no unit for what is in {wanted}{did_you_mean(unit, [*factors, *more], listed=True)}")

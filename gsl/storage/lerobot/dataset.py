@@ -63,7 +63,7 @@ class DataSet(NamedTuple):
     def files(self) -> list[Path]:
         """What is read of it."""
         about = [self.folder / INFO, *_episode_files(self.folder, self.version)]
-        return [*about, *dict.fromkeys(one.file for one in self.episodes)]
+        return [*about, *dict.fromkeys(episode.file for episode in self.episodes)]
 
 
 def is_data_set(path: Path) -> bool:
@@ -102,28 +102,28 @@ def open_data_set(folder: Path, memory: float) -> DataSet:
     if not isinstance(fps, int | float) or isinstance(fps, bool) or not 0 < fps < 1e5:
         raise TrajectoryError(folder / INFO, f"fps is {fps!s:.20}, no rate of frames [1/s]")
     robot = str(info.get("robot_type") or "unknown")
-    known = {"robot_type": robot, "fps": fps, "data_set": folder.resolve().name}
+    about = {"robot_type": robot, "fps": fps, "data_set": folder.resolve().name}
     chunk = info.get("chunks_size", 1000)
     if type(chunk) is not int or not 0 < chunk < MOST:
         raise TrajectoryError(folder / INFO, f"chunks_size is {chunk!s:.20}, no number of episodes")
-    told = list(islice(_read_episodes(folder, version, memory), MOST_EPISODES + 1))
-    if len(told) > MOST_EPISODES:
+    rows = list(islice(_read_episodes(folder, version, memory), MOST_EPISODES + 1))
+    if len(rows) > MOST_EPISODES:
         raise TrajectoryError(folder, f"has more than {MOST_EPISODES:,} episodes; take apart what you want to read")
-    if not told:
+    if not rows:
         raise TrajectoryError(folder, "has no episode; was the recording finished (dataset.finalize())?")
-    found = []
-    for one in sorted(told, key=lambda one: one["episode_index"]):
-        index = one["episode_index"]
+    entries = []
+    for row in sorted(rows, key=lambda row: row["episode_index"]):
+        index = row["episode_index"]
         if version.startswith("v3"):
-            place = BY_FILE.format(chunk_index=one["data/chunk_index"], file_index=one["data/file_index"])
+            place = BY_FILE.format(chunk_index=row["data/chunk_index"], file_index=row["data/file_index"])
         else:
             place = BY_EPISODE.format(episode_chunk=index // chunk, episode_index=index)
-        tasks = one.get("tasks")
+        tasks = row.get("tasks")
         task = {"task": "; ".join(map(str, tasks))} if isinstance(tasks, list) and tasks else {}
-        found.append(Entry(index, one["length"], folder / place, {**known, "episode_index": index, **task}, names))
-    _check_files(folder, found)
+        entries.append(Entry(index, row["length"], folder / place, {**about, "episode_index": index, **task}, names))
+    _check_files(folder, entries)
     angles = "deg" if info.get("angles") == "deg" else None
-    return DataSet(folder, version, robot, names, widths, tuple(found), angles)
+    return DataSet(folder, version, robot, names, widths, tuple(entries), angles)
 
 
 def _read_info(folder: Path) -> dict[str, Any]:
@@ -157,8 +157,8 @@ def _flatten(names: Any) -> Iterator[str]:
     """Return names of axes: a list, or lists under keys such as `motors`."""
     if isinstance(names, str):
         yield names
-    for one in names.values() if isinstance(names, dict) else names if isinstance(names, list) else ():
-        yield from _flatten(one)
+    for name in names.values() if isinstance(names, dict) else names if isinstance(names, list) else ():
+        yield from _flatten(name)
 
 
 def _episode_files(folder: Path, version: str) -> list[Path]:
@@ -177,16 +177,17 @@ def _read_episodes(folder: Path, version: str, memory: float) -> Iterator[dict[s
             rows = _read_table(path, [*due, "tasks"], memory) if version.startswith("v3") else _read_lines(path, memory)
         except (OSError, ValueError, NotImplementedError) as error:
             raise TrajectoryError(path, f"cannot be read: {error}; copy the data set again") from error
-        for row, one in enumerate(rows):
-            whole = isinstance(one, dict) and all(type(one.get(key)) is int and 0 <= one[key] < MOST for key in due)
+        for row, cell in enumerate(rows):
+            whole = isinstance(cell, dict) and all(type(cell.get(key)) is int and 0 <= cell[key] < MOST for key in due)
             if not whole:
                 raise TrajectoryError(path, f"has no whole number for each of {', '.join(due)}", row=row)
-            yield one
+            yield cell
 
 
 def _read_table(path: Path, names: list[str], memory: float) -> list[dict[str, Any]]:
     import pyarrow.parquet as pq
 
+    check_file(path)
     with pq.ParquetFile(path) as file:  # what pyarrow raises of a damaged file is a ValueError or an OSError
         there = [name for name in names if name in file.schema_arrow.names]
         check_need(path, 20.0 * count_bytes(file.metadata, there), memory)
@@ -198,9 +199,11 @@ def _read_lines(path: Path, memory: float) -> list[Any]:
     return [parse_json(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
 
 
-def _check_files(folder: Path, found: list[Entry]) -> None:
-    lacking = [one for one in found if not one.file.is_file()]
+def _check_files(folder: Path, entries: list[Entry]) -> None:
+    lacking = [entry for entry in entries if not entry.file.is_file()]
     if lacking:
         name = lacking[0].file.relative_to(folder)
-        problem = f"{len(lacking)} of {len(found)} episodes have no file here ({name}); download the folder `data` too"
+        problem = (
+            f"{len(lacking)} of {len(entries)} episodes have no file here ({name}); download the folder `data` too"
+        )
         raise InputError(f"{folder}: {problem}")

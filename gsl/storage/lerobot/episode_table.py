@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.budget import check_file
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.parquet_table import convert, names_of
 from gsl.storage.importers.sizes import check_need
@@ -26,6 +27,7 @@ class EpisodeTable:
     def __init__(self, entry: Entry, memory: float) -> None:
         self.entry, self.path, self.memory = entry, entry.file, memory
         self.fields: Mapping[str, Any] = entry.fields
+        check_file(self.path)
         self.raw = names_of(self.path)
         self.parts = {
             f"{key}.{name}": (key, index)

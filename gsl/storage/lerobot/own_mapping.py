@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from gsl.errors import ConfigError, TrajectoryError
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.signal import Signal, Time
 from gsl.storage.lerobot.arms import JAW_CLOSED, JAW_STROKE, OLD, OLD_ZEROS, OURS, bare, family, is_gripper, motor
-from gsl.storage.lerobot.dataset import ACTION, STATE, DataSet
+from gsl.storage.lerobot.dataset import ACTION, INFO, STATE, DataSet
 from gsl.storage.lerobot.encoder_steps import STEP, find_range, on_degrees
 from gsl.storage.lerobot.episode_table import TIME, EpisodeTable
 
@@ -68,27 +69,53 @@ def _entries(data: DataSet, mapping: LogMapping, arm: str | None) -> tuple[dict[
             return {joint: str(index) for index, joint in enumerate(joints)}, []
         problem = f"the data set names no joints: say its {width} in order, mapping.joints=[...], and mapping.angles"
         raise ConfigError("mapping.joints", problem)
-    there = [one for one in data.names[STATE] if one in data.names[ACTION]]
-    there = [one for one in there if one.endswith(".pos")] or there
+    there = [name for name in data.names[STATE] if name in data.names[ACTION]]
+    there = [name for name in there if name.endswith(".pos")] or there
     if not there:
         shown = [", ".join(data.names[key][:SHOWN]) for key in (STATE, ACTION)]
         problem = f"{STATE} has {shown[0]}, {ACTION} has {shown[1]}: none is in both; say where things are in a mapping"
         raise TrajectoryError(data.folder, problem)
-    known = {bare(one): one for one in there}
+    by_joint = {bare(name): name for name in there}
     notes = []
-    if joints is None and arm in ("so100", "so101") and set(known) == set(OURS.values()):
+    if joints is None and arm in ("so100", "so101") and set(by_joint) == set(OURS.values()):
         joints = dict(OURS)
         theirs = ",".join(OURS.values())
         notes += [f"joints are called as in the world so101, {', '.join(OURS)}; mapping.joints=[{theirs}] keeps theirs"]
-    wanted = joints if isinstance(joints, dict) else {one: one for one in (joints or known)}
+    if mapping.joints is None:
+        _check_pairs(data, there)
+    wanted = joints if isinstance(joints, dict) else {joint: joint for joint in (joints or by_joint)}
     for ours, theirs in wanted.items():
-        if bare(str(theirs)) not in known:
-            problem = f"is no joint of the data set{did_you_mean(str(theirs), list(known), listed=True)}"
+        if bare(str(theirs)) not in by_joint:
+            problem = f"is no joint of the data set{did_you_mean(str(theirs), list(by_joint), listed=True)}"
             raise ConfigError(f"mapping.joints.{ours}", problem, given=str(theirs))
-    chosen = {ours: known[bare(str(theirs))] for ours, theirs in wanted.items()}
-    left = [one for one in dict.fromkeys([*data.names[STATE], *data.names[ACTION]]) if one not in chosen.values()]
+    chosen = {ours: by_joint[bare(str(theirs))] for ours, theirs in wanted.items()}
+    left = [name for name in dict.fromkeys([*data.names[STATE], *data.names[ACTION]]) if name not in chosen.values()]
     notes += [f"left out, as no joint's position: {', '.join(left[:SHOWN])}{' ...' * (len(left) > SHOWN)}"] * bool(left)
     return chosen, notes
+
+
+def _check_pairs(data: DataSet, there: Sequence[str]) -> None:
+    """Refuse a joint that only one of the lists has: a renamed one; a state may have more than positions.
+
+    Raises:
+        TrajectoryError: A command has no state, or a position, which `.pos` tells, no command.
+    """
+    own = {key: [name for name in data.names[key] if name not in there] for key in (ACTION, STATE)}
+    if any(name.endswith(".pos") for name in there):
+        own = {key: [name for name in names if name.endswith(".pos")] for key, names in own.items()}
+    elif not own[ACTION]:
+        return
+    for key, other in ((ACTION, STATE), (STATE, ACTION)):
+        if own[key]:
+            joint, choices = own[key][0], own[other]
+            only = len(choices) == 1 == len(own[key])
+            near = choices[0] if only else next(iter(get_close_matches(joint, choices, n=1, cutoff=0.75)), "")
+            mean = f"; did you mean {other}.{near}? Name both alike in {INFO}" if near else ""
+            take = f"mapping.joints=[{','.join(bare(name) for name in there)}]"
+            problem = (
+                f"goes with {other}.{joint}, which is missing{mean}{', or' if near else ';'} leave it out with {take}"
+            )
+            raise TrajectoryError(data.folder, problem, column=f"{key}.{joint}")
 
 
 def _scales(
@@ -115,8 +142,8 @@ def _scales(
         ranges |= {joint: steps} if steps else {}
     if kind == "percent":
         _check_percent(data, body, values, ranges)
-        told = ", ".join(f"{joint} {ranges[joint]}" for joint in body)
-        why += f"; calibrated ranges, in ticks: {told}"
+        ranges_text = ", ".join(f"{joint} {ranges[joint]}" for joint in body)
+        why += f"; calibrated ranges, in ticks: {ranges_text}"
     scales: Scales = {}
     for joint, entry in entries.items():
         so = arm in ("so100", "so101")
@@ -206,18 +233,18 @@ def _read_calibration(file: str, entries: Mapping[str, str], arm: str | None) ->
     """
     where = "mapping.calibration"
     try:
-        told: Any = parse_json(read_text(Path(file), TEXT_BYTES))
+        calibration: Any = parse_json(read_text(Path(file), TEXT_BYTES))
     except ValueError as error:
         raise ConfigError(where, f"is no JSON: {error}", given=file) from error
-    found = {}
+    motors = {}
     for joint, entry in entries.items():
-        one = told.get(motor(entry), told.get(bare(entry))) if isinstance(told, dict) else None
-        if not isinstance(one, dict) or not all(type(one.get(key)) is int for key in ("range_min", "range_max")):
-            there = ", ".join(map(str, told))[:80] if isinstance(told, dict) else "no joints"
+        about = calibration.get(motor(entry), calibration.get(bare(entry))) if isinstance(calibration, dict) else None
+        if not isinstance(about, dict) or not all(type(about.get(key)) is int for key in ("range_min", "range_max")):
+            there = ", ".join(map(str, calibration))[:80] if isinstance(calibration, dict) else "no joints"
             raise ConfigError(where, f"has no range_min and range_max of {motor(entry)}; it has {there}", given=file)
-        if one.get("drive_mode") and arm != "koch":  # Dynamixel buses do not apply it
+        if about.get("drive_mode") and arm != "koch":  # Dynamixel buses do not apply it
             raise ConfigError(where, f"has a drive_mode for {motor(entry)}, which is not read", given=file)
-        found[joint] = one["range_max"] - one["range_min"]
-        if not 0 < found[joint] <= 1_000_000:
+        motors[joint] = about["range_max"] - about["range_min"]
+        if not 0 < motors[joint] <= 1_000_000:
             raise ConfigError(where, f"has an empty range of {motor(entry)}", given=file)
-    return found
+    return motors

@@ -27,29 +27,32 @@ def check_signals(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list
     wraps = find_wraps(episodes, joints)
     whole = join_turns(episodes) if wraps else episodes
     checks = (find_glitches, find_copies, find_stuck, find_velocities)
-    found = [*wraps, *(one for check in checks for one in check(whole, joints))]
-    return [*together(found, joints), *find_base_frames(episodes)]
+    findings = [*wraps, *(finding for check in checks for finding in check(whole, joints))]
+    return [*together(findings, joints), *find_base_frames(episodes)]
 
 
 def join_turns(episodes: Sequence[Trajectory]) -> list[Trajectory]:
     """Return trajectories whose wrapping angles go on; velocities of these are derived anew."""
     turns = find_turns(episodes)
     made = []
-    for one in episodes:
-        position, action, velocity = one.position.copy(), one.action.copy(), one.velocity.copy()
+    for episode in episodes:
+        position, action, velocity = episode.position.copy(), episode.action.copy(), episode.velocity.copy()
         for (signal, k), turn in turns.items():
             if signal == "action":
                 action[:, k] = join(action[:, k], turn)
         for (signal, k), turn in turns.items():
             if signal == "position":
                 position[:, k] = join(position[:, k], turn)
-                velocity[:, k] = np.gradient(position[:, k], one.time)
-                apart = action[:, k] - position[: len(one), k]
+                velocity[:, k] = np.gradient(position[:, k], episode.time)
+                apart = action[:, k] - position[: len(episode), k]
                 action[:, k] -= turn * np.round(apart / turn)  # a command means the nearest of all turns
-        made.append(replace(one, position=position, action=action, velocity=velocity))
+        made.append(replace(episode, position=position, action=action, velocity=velocity))
     return made
 
 
 def mend_signals(episodes: Sequence[Trajectory]) -> list[Trajectory]:
     """Return trajectories without the wraps and the one-sample glitches that `check_signals` reports."""
-    return [replace(one, position=mend(one.position), action=mend(one.action)) for one in join_turns(episodes)]
+    return [
+        replace(episode, position=mend(episode.position), action=mend(episode.action))
+        for episode in join_turns(episodes)
+    ]

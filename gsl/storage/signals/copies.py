@@ -18,7 +18,7 @@ UNLIKE = 0.1  # share of a command's range by which another has to differ
 
 def find_copies(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
     """Return commands that are copies of positions, and positions and velocities that are copies of others."""
-    found = []
+    findings = []
     for k, joint in enumerate(joints):
         rows = [row for row in ROWS if _same(_pairs(episodes, k, row))]
         if rows:
@@ -28,33 +28,33 @@ def find_copies(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[F
             )
             problem = f"is a copy of the measured position of {of}: no servo follows so well, and nothing was commanded"
             remedy = "log what was sent to the servos"
-            found.append(Finding("copy", (f"action.{joint}",), (joint,), problem, remedy))
-        if _same([(one.velocity[:, k], one.position[:, k]) for one in episodes]):
+            findings.append(Finding("copy", (f"action.{joint}",), (joint,), problem, remedy))
+        if _same([(episode.velocity[:, k], episode.position[:, k]) for episode in episodes]):
             problem, remedy = f"is a copy of position.{joint}", "choose the column of the velocities, or leave it out"
-            found.append(Finding("copy", (f"velocity.{joint}",), (joint,), problem, remedy))
-    return [*found, *_of_positions(episodes, joints)]
+            findings.append(Finding("copy", (f"velocity.{joint}",), (joint,), problem, remedy))
+    return [*findings, *_of_positions(episodes, joints)]
 
 
 def _of_positions(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
-    found = []
+    findings = []
     for k, joint in enumerate(joints):
         for other in range(k):
             if not _differ_in_commands(episodes, k, other):
                 continue
-            if _same([(one.position[:, k], one.position[:, other]) for one in episodes]):
+            if _same([(episode.position[:, k], episode.position[:, other]) for episode in episodes]):
                 columns, both = (f"position.{joints[other]}", f"position.{joint}"), (joints[other], joint)
                 problem = "are copies of each other though their commands differ"
-                found.append(Finding("copy", columns, both, problem, "look up which column is whose"))
-    return found
+                findings.append(Finding("copy", columns, both, problem, "look up which column is whose"))
+    return findings
 
 
 def _pairs(episodes: Sequence[Trajectory], k: int, row: int) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return commands, and the positions so many rows on."""
     pairs = []
-    for one in episodes:
-        length = len(one)
+    for episode in episodes:
+        length = len(episode)
         first, last = max(0, -row), min(length, length + 1 - row)
-        pairs.append((one.action[first:last, k], one.position[first + row : last + row, k]))
+        pairs.append((episode.action[first:last, k], episode.position[first + row : last + row, k]))
     return pairs
 
 
@@ -69,6 +69,6 @@ def _same(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> bool:
 
 
 def _differ_in_commands(episodes: Sequence[Trajectory], k: int, other: int) -> bool:
-    a, b = (np.concatenate([one.action[:, joint] for one in episodes]) for joint in (k, other))
+    a, b = (np.concatenate([episode.action[:, joint] for episode in episodes]) for joint in (k, other))
     least = max(MOVES, UNLIKE * max(np.ptp(a), np.ptp(b)))
     return bool(np.ptp(a - b) > least)

@@ -57,10 +57,10 @@ class Place(NamedTuple):
 
 def first_places(places: Iterable[Place]) -> dict[int, list[Place]]:
     """Return the places of each joint, in order."""
-    found: dict[int, list[Place]] = {}
+    by_joint: dict[int, list[Place]] = {}
     for place in places:
-        found.setdefault(place.joint, []).append(place)
-    return found
+        by_joint.setdefault(place.joint, []).append(place)
+    return by_joint
 
 
 def per_joint(
@@ -76,14 +76,14 @@ def per_joint(
 def together(findings: Sequence[Finding], joints: Sequence[str]) -> list[Finding]:
     """Return findings that all joints of a log share as one, and others as they are."""
     alike: dict[tuple[str, str, str], list[Finding]] = {}
-    for one in findings:
-        alike.setdefault((one.kind, one.columns[0].partition(".")[0], one.problem), []).append(one)
+    for finding in findings:
+        alike.setdefault((finding.kind, finding.columns[0].partition(".")[0], finding.problem), []).append(finding)
     joined: list[Finding] = []
     for group in alike.values():
         if len(group) == len(joints) > 1:
-            columns = tuple(column for one in group for column in one.columns)
+            columns = tuple(column for finding in group for column in finding.columns)
             joined.append(
-                group[0]._replace(columns=columns, joints=tuple(joints), times=sum(one.times for one in group))
+                group[0]._replace(columns=columns, joints=tuple(joints), times=sum(finding.times for finding in group))
             )
         else:
             joined += group

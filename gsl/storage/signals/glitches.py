@@ -21,8 +21,11 @@ def find_glitches(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list
     """Return positions that have one-sample glitches; a command may jump as it likes."""
     places = [Place(k, n, row) for n, k, row in _glitches(episodes)]
     remedy = "mapping.glitches=mend interpolates such rows; look at the bus or the logger"
-    found = per_joint("glitch", "position", places, joints, "", remedy)
-    return [one._replace(problem=f"jumps for one sample and is back in the next, {count(one.times)}") for one in found]
+    findings = per_joint("glitch", "position", places, joints, "", remedy)
+    return [
+        finding._replace(problem=f"jumps for one sample and is back in the next, {count(finding.times)}")
+        for finding in findings
+    ]
 
 
 def mend(values: np.ndarray) -> np.ndarray:

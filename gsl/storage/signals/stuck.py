@@ -35,7 +35,7 @@ def find_stuck(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Fi
 
 def _freezes(episodes: Sequence[Trajectory]) -> Iterator[Place]:
     for number, episode in enumerate(episodes):
-        works = np.all([np.ones(len(episode)), *_enabled(episode)], axis=0)
+        works = np.all([np.ones(len(episode)), *_list_flags(episode)], axis=0)
         for k in range(episode.action.shape[1]):
             row = _frozen_from(episode, k, works) if moves(episode, k) else None
             if row is not None:
@@ -61,27 +61,27 @@ def _frozen_from(episode: Trajectory, k: int, works: np.ndarray) -> int | None:
     return None
 
 
-def _enabled(episode: Trajectory) -> list[np.ndarray]:
+def _list_flags(episode: Trajectory) -> list[np.ndarray]:
     return [values[: len(episode)] for key, values in episode.sensors.items() if key.partition(".")[0] == "enabled"]
 
 
 def _still(episodes: Sequence[Trajectory]) -> Iterator[Place]:
     for k in range(episodes[0].action.shape[1]):
-        speeds = np.concatenate([one.velocity[:, k] for one in episodes])
-        if np.ptp(speeds) == 0.0 and any(np.ptp(one.position[:, k]) > MOVES for one in episodes):
+        speeds = np.concatenate([episode.velocity[:, k] for episode in episodes])
+        if np.ptp(speeds) == 0.0 and any(np.ptp(episode.position[:, k]) > MOVES for episode in episodes):
             yield Place(k, 0, 0)
 
 
 def _stale(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
-    found = []
+    findings = []
     for k, joint in enumerate(joints):
-        share = _share_repeated([one.position[:, k] for one in episodes])
+        share = _share_repeated([episode.position[:, k] for episode in episodes])
         if share > REPEATED:
             rows = 1.0 / (1.0 - min(share, 0.99))
             problem = f"is read anew in every {_ordinal(rows)} row only and repeats itself between"
             remedy = "log at the rate of the sensors (mapping.period resamples), or read them in every row"
-            found.append(Finding("stale", (f"position.{joint}",), (joint,), problem, remedy))
-    return found
+            findings.append(Finding("stale", (f"position.{joint}",), (joint,), problem, remedy))
+    return findings
 
 
 def _ordinal(rows: float) -> str:
@@ -91,17 +91,17 @@ def _ordinal(rows: float) -> str:
 
 def _share_repeated(channels: Sequence[np.ndarray]) -> float:
     """Return the share of the rows of quick motion in which a channel repeats the row before; 0 if it has few."""
-    steps = np.concatenate([np.abs(np.diff(one)) for one in channels])
+    steps = np.concatenate([np.abs(np.diff(channel)) for channel in channels])
     some = steps[steps > 0.0]
     if not len(some):
         return 0.0
     resolution = float(np.quantile(some, 0.05))
     repeats = []
-    for one in channels:
-        if len(one) <= 2 * QUICK + 1:
+    for channel in channels:
+        if len(channel) <= 2 * QUICK + 1:
             continue
-        far = np.abs(one[2 * QUICK :] - one[: -2 * QUICK]) > 2 * QUICK * STEPS * resolution
-        far &= np.abs(one[2 * QUICK :] - one[: -2 * QUICK]) > MOVES
-        repeats.append((np.diff(one)[QUICK : QUICK + len(far)] == 0.0)[far])
+        far = np.abs(channel[2 * QUICK :] - channel[: -2 * QUICK]) > 2 * QUICK * STEPS * resolution
+        far &= np.abs(channel[2 * QUICK :] - channel[: -2 * QUICK]) > MOVES
+        repeats.append((np.diff(channel)[QUICK : QUICK + len(far)] == 0.0)[far])
     quick = np.concatenate(repeats) if repeats else np.zeros(0)
     return float(quick.mean()) if len(quick) >= LEAST else 0.0

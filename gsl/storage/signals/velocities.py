@@ -15,20 +15,20 @@ SLOW = 0.05  # slopes below are noise [rad/s]
 
 def find_velocities(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
     """Return velocities that have the other sign, or that are another joint's."""
-    slopes = np.concatenate([np.gradient(one.position, one.time, axis=0) for one in episodes])
-    logged = np.concatenate([one.velocity for one in episodes])
+    slopes = np.concatenate([np.gradient(episode.position, episode.time, axis=0) for episode in episodes])
+    logged = np.concatenate([episode.velocity for episode in episodes])
     alike = _correlations(logged, slopes)
-    found = []
+    findings = []
     for k, joint in enumerate(joints):
         if alike[k, k] < -FOLLOWS:
             problem, remedy = f"has the other sign than the slope of position.{joint}", "say sign: -1 in its signal"
-            found.append(Finding("velocity", (f"velocity.{joint}",), (joint,), problem, remedy))
+            findings.append(Finding("velocity", (f"velocity.{joint}",), (joint,), problem, remedy))
         elif abs(alike[k, k]) < UNLIKE and (other := int(np.argmax(alike[k]))) != k and alike[k, other] > FOLLOWS:
             if abs(alike[other, other]) > FOLLOWS:  # both move alike: nothing is exchanged
                 continue
             problem = f"is the slope of position.{joints[other]} and not of position.{joint}"
-            found.append(Finding("velocity", (f"velocity.{joint}",), (joint,), problem, "swap the columns"))
-    return found
+            findings.append(Finding("velocity", (f"velocity.{joint}",), (joint,), problem, "swap the columns"))
+    return findings
 
 
 def _correlations(a: np.ndarray, b: np.ndarray) -> np.ndarray:

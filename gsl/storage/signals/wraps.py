@@ -20,15 +20,15 @@ AROUND = 3  # rows before a jump in which its command may have asked for it
 
 def find_wraps(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
     """Return the positions and commands that wrap."""
-    found = []
+    findings = []
     for signal in ("position", "action"):
         places = [place for place, _ in _wraps(episodes, signal)]
         turns = {place.joint: turn for place, turn in _wraps(episodes, signal)}
-        for one in per_joint("wrap", signal, places, joints, "", "mapping.unwrap=true joins the turns"):
-            size = turns[joints.index(one.joints[0])]
+        for finding in per_joint("wrap", signal, places, joints, "", "mapping.unwrap=true joins the turns"):
+            size = turns[joints.index(finding.joints[0])]
             by = "a turn" if abs(size - TURN) < 1e-9 else f"its range ({size:.3g} rad)"
-            found.append(one._replace(problem=f"jumps by {by}, {count(one.times)}: the angle wraps"))
-    return found
+            findings.append(finding._replace(problem=f"jumps by {by}, {count(finding.times)}: the angle wraps"))
+    return findings
 
 
 def join(values: np.ndarray, turn: float) -> np.ndarray:

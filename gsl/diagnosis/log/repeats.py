@@ -1,0 +1,122 @@
+"""Repeats: records of the same motion, whose difference is what a robot does not repeat.
+
+A logger of a real robot has a clock of its own. It begins earlier or later, and a command reaches it up to a row late.
+So two records repeat each other if their commands do as functions of time, and not only row by row. Under other
+conditions the same commands are another motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import correlate
+
+from gsl.diagnosis.log.records import Record
+from gsl.diagnosis.settings import RepeatSettings
+
+DIGITS = 6  # of commands [rad] that are equal row by row
+
+
+class Repeat(NamedTuple):
+    """Which motion a record is of, by number, and by how many rows it is later than the first record of that motion."""
+
+    motion: int
+    later: float = 0.0
+
+
+def find_repeats(records: Sequence[Record], period: float, settings: RepeatSettings | None = None) -> list[Repeat]:
+    """Return the motion of each record.
+
+    Args:
+        records: In an order of their own; of a motion's records, the first is what others are compared with.
+        period: Control period [s].
+        settings: What counts as the same.
+    """
+    how, repeats = settings or RepeatSettings(), list[Repeat]()
+    firsts: list[Record] = []
+    seen: dict[tuple[bytes, str], Repeat] = {}
+    for record in records:
+        exact = (np.round(record.commands, DIGITS).tobytes(), repr(record.conditions))
+        if (repeat := seen.get(exact)) is None:
+            repeat = _find(record, firsts, period, how) or Repeat(len(firsts))
+            if repeat.motion == len(firsts):
+                firsts.append(record)
+            seen[exact] = repeat
+        repeats.append(repeat)
+    return repeats
+
+
+def _find(record: Record, firsts: Sequence[Record], period: float, how: RepeatSettings) -> Repeat | None:
+    """Return the motion among the first records of motions that a record repeats, if it does."""
+    if record.base is not None:
+        return None  # on the ground what a robot does depends on where it stands
+    for motion, first in enumerate(firsts):
+        if first.conditions != record.conditions:
+            continue
+        if (later := _compare(first.commands, record.commands, period, how)) is not None:
+            return Repeat(motion, later)
+    return None
+
+
+def _compare(first: np.ndarray, again: np.ndarray, period: float, how: RepeatSettings) -> float | None:
+    """Return by how many rows the same commands, shape (T, width), come later in another record; None for others."""
+    if first.shape[1] != again.shape[1] or min(len(first), len(again)) < how.share * max(len(first), len(again)):
+        return None
+    extents = np.array([[part.min(axis=0), part.max(axis=0)] for part in (first, again)])
+    if (np.abs(extents[0] - extents[1]) > how.same + how.of_range * np.ptp(extents[0], axis=0)).any():
+        return None
+    later = _align(first, again, round(how.apart / period))
+    before, after = _overlap(first, again, later)
+    if len(before) < how.share * max(len(first), len(again)):
+        return None
+    padded = np.pad(before, ((1, 1), (0, 0)), mode="edge")
+    near = np.array([padded[:-2], padded[1:-1], padded[2:]])  # a row late or early is the logger's
+    outside = (after < near.min(axis=0) - how.same) | (after > near.max(axis=0) + how.same)
+    if outside.mean(axis=0).max() > how.outside:
+        return None
+    return later + _refine(before, after)
+
+
+def _align(first: np.ndarray, again: np.ndarray, most: int) -> int:
+    """Return the whole rows, at most so many, by which commands are later where they are most alike."""
+    a, b = (part - part.mean(axis=0) for part in (first, again))
+    alike = sum(correlate(b[:, k], a[:, k], method="fft") for k in range(a.shape[1]))
+    lags = np.arange(1 - len(a), len(b))
+    own = np.abs(lags) <= most
+    return int(lags[own][np.argmax(alike[own])])
+
+
+def _overlap(first: np.ndarray, again: np.ndarray, later: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return the rows that two records share, one of which is so many rows later."""
+    before, after = first[max(0, -later) :], again[max(0, later) :]
+    shared = min(len(before), len(after))
+    return before[:shared], after[:shared]
+
+
+def _refine(before: np.ndarray, after: np.ndarray) -> float:
+    """Return the part of a row by which commands are later beyond whole rows; 0 where they are equal."""
+    slope = np.gradient(before, axis=0)
+    return float(np.clip(-((after - before) * slope).sum() / max((slope**2).sum(), 1e-12), -0.5, 0.5))
+
+
+def align_repeats(group: Sequence[tuple[Record, float]], period: float) -> np.ndarray:
+    """Return what was measured in repeats of one motion at the same times of it, shape (repeats, rows, n_channels).
+
+    Between rows it goes on at the record's velocity: a mean of two rows would have less noise than one.
+
+    Args:
+        group: Records, and by how many rows each is later than the motion's first one.
+        period: Control period [s].
+    """
+    rows = [round(later) for _, later in group]
+    start, stop = max(0, -min(rows)), min(len(record) - row for (record, _), row in zip(group, rows, strict=True))
+    return np.array([
+        _shift(record, later - row, period)[start + row : stop + row + 1]
+        for (record, later), row in zip(group, rows, strict=True)
+    ])  # fmt: skip
+
+
+def _shift(record: Record, rows: float, period: float) -> np.ndarray:
+    return record.measured if rows == 0.0 else record.position + rows * period * record.velocity

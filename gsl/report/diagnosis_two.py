@@ -1,0 +1,81 @@
+"""Two diagnoses side by side: which causes they share, and which are of one alone.
+
+What two benches with the same servos share is likely of the servo; what differs is likely of a bench.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from gsl.report.diagnosis_verdict import cause_name, verdict
+from gsl.report.diagnosis_words import NONE, Document, entries, finite, interval, name, part, value
+from gsl.report.tables import Table
+
+SITS = {
+    "command": "bus, controller or logger",
+    "sensor": "sensor or logger",
+    "servo": "servo",
+    "body": "body",
+    "contact": "ground",
+    "environment": "surroundings",
+}
+"""Where an effect sits, by its kind."""
+
+
+def set_side_by_side(first: Document, second: Document) -> list[dict[str, Any]]:
+    """Return the parameters of the causes of two diagnoses: cause, parameter, where it sits, both, and whether alike.
+
+    Where a verdict names no cause, the suspects stand for it.
+    """
+    sides = [dict(_list_parameters(document)) for document in (first, second)]
+    return [
+        {
+            "cause": cause,
+            "parameter": parameter,
+            "sits": sits,
+            "first": (left := sides[0].get((cause, parameter, sits))),
+            "second": (right := sides[1].get((cause, parameter, sits))),
+            "alike": left is not None and right is not None and _are_alike(left, right),
+        }
+        for cause, parameter, sits in dict.fromkeys([*sides[0], *sides[1]])
+    ]
+
+
+def table_of_two(first: Document, second: Document, names: tuple[str, str]) -> Table:
+    """Return the causes of two diagnoses as a table."""
+    rows = [
+        (row["cause"], name(row["parameter"]), row["sits"], _show(row["first"]), _show(row["second"]), _judge(row))
+        for row in set_side_by_side(first, second)
+    ]
+    verdicts = ", ".join(f"{verdict(document)} in {run}" for document, run in zip((first, second), names, strict=True))
+    columns = ("cause", "parameter", "sits in", *names, "")
+    return Table(f"causes ({verdicts})", columns, rows, "Alike: the 95 % interval of the difference holds 0.")
+
+
+def _list_parameters(document: Document) -> Iterator[tuple[tuple[str, str, str], Document]]:
+    for cause in entries(document, "causes") or entries(document, "suspects"):
+        sits = SITS.get(str(cause.get("kind")), NONE)
+        for parameter, fitted in part(cause, "parameters").items():
+            yield (cause_name(cause), parameter, sits), fitted
+
+
+def _are_alike(left: Document, right: Document) -> bool:
+    (a, half), (b, width) = (_read(fitted) for fitted in (left, right))
+    return abs(a - b) <= (half**2 + width**2) ** 0.5
+
+
+def _read(fitted: Document) -> tuple[float, float]:
+    """Return a value and half its 95 % interval, 0 where there is none."""
+    number, low, high = (finite(fitted.get(key)) for key in ("value", "low", "high"))
+    return number or 0.0, 0.0 if low is None or high is None else 0.5 * (high - low)
+
+
+def _show(fitted: Document | None) -> str:
+    return NONE if fitted is None else f"{value(fitted)} ({interval(fitted)})"
+
+
+def _judge(row: Document) -> str:
+    if row["first"] is None or row["second"] is None:
+        return "in one alone"
+    return "alike" if row["alike"] else "differs"

@@ -1,0 +1,45 @@
+"""Two diagnoses side by side: what their causes share, and what is of one alone."""
+
+from typing import Any
+
+from gsl.report.diagnosis_two import set_side_by_side, table_of_two
+
+
+def cause(effect: str, kind: str, **parameters: tuple[float, float]) -> dict[str, Any]:
+    fitted = {
+        name: {"value": value, "low": value - half, "high": value + half, "unit": ""}
+        for name, (value, half) in parameters.items()
+    }
+    return {"effect": effect, "kind": kind, "scope": "all", "joints": ["a", "b"], "fixed": {}, "parameters": fitted}
+
+
+FRICTION = cause("coulomb_friction", "servo", torque=(0.20, 0.02))
+FIRST = {"verdict": "causes", "causes": [FRICTION, cause("servo_gain", "servo", kp=(0.5, 0.02), kd=(0.4, 0.1))]}
+SECOND = {
+    "verdict": "unknown",
+    "causes": [],
+    "suspects": [
+        cause("coulomb_friction", "servo", torque=(0.22, 0.01)),
+        cause("servo_gain", "servo", kp=(0.6, 0.02), kd=(0.5, 0.1)),
+        cause("command_latency", "command", delay=(0.034, 0.001)),
+    ],
+}
+
+
+def test_values_are_alike_where_the_interval_of_their_difference_holds_nothing() -> None:
+    rows = {(row["cause"], row["parameter"]): row for row in set_side_by_side(FIRST, SECOND)}
+    alike = {parameter: row["alike"] for (_, parameter), row in rows.items()}
+    assert alike == {"torque": True, "kp": False, "kd": True, "delay": False}
+    late = rows["command latency of all joints", "delay"]
+    assert late["sits"] == "bus, controller or logger" and late["first"] is None and late["second"]["value"] == 0.034
+
+
+def test_the_table_says_what_is_of_one_alone() -> None:
+    table = table_of_two(FIRST, SECOND, ("a/diagnose", "b/diagnose"))
+    assert table.title == "causes (causes in a/diagnose, unknown in b/diagnose)"
+    assert [row[-1] for row in table.rows] == ["alike", "differs", "alike", "in one alone"]
+    assert [row[3] for row in table.rows][-1] == "–"
+
+
+def test_nothing_is_no_row() -> None:
+    assert table_of_two({"verdict": "no_gap"}, {"verdict": "no_gap"}, ("a", "b")).rows == []
