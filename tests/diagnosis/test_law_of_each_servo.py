@@ -76,6 +76,12 @@ def test_a_calibration_that_explains_surely_less_than_a_servo_could_is_a_gap() -
     assert Judge(1.0).judge(replace(selection(quiet), none=quiet), 1.1).word == "unknown"
 
 
+def test_of_fewer_windows_than_folds_no_law_is_learned() -> None:
+    whole = arm_log()
+    few = replace(whole, train=whole.train[:1])
+    assert learn_laws(few, simulator(), {}, no_shifts(2)) is None
+
+
 # --- what it is made of
 
 

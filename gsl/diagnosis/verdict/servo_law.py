@@ -155,6 +155,8 @@ class _Fits:
         """Replay a log by a simulator with effects and a calibration, if it can be."""
         if log.walking or log.comparison.shaking.any():
             return None
+        if len(log.train) < how.folds:
+            return None
         windows = [spread(index, how.windows) for index in (log.train, log.held_out)]
         benches = [Bench(simulator, log.pieces.take(index), log.comparison) for index in windows]
         train, held = (replay(bench, effects, shifts, how.lags) for bench in benches)
@@ -174,7 +176,7 @@ class _Fits:
 def learn_laws(
     log: Log, simulator: Simulator, effects: Effects, shifts: np.ndarray, settings: LawSettings | None = None
 ) -> Laws | None:
-    """Return the laws on top of a hypothesis; None where joints shake, a robot walks, or a replay diverges.
+    """Return the laws on top of a hypothesis; None where joints shake, a robot walks, or windows are few.
 
     Args:
         log: Its training windows are fitted, the held-out ones scored.
