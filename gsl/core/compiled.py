@@ -1,6 +1,7 @@
-"""`compile_kernel` and `compile_inner`: numba's njit with a cache on disk, new whenever gsl's sources change.
+"""`compile_kernel` and `compile_inner`: numba's njit with a cache on disk, new whenever its sources change.
 
 Numba looks only at the file of a compiled function itself, so an edit of another one that it calls would go unseen.
+The sources are therefore the files that compile something, and all of gsl that these import.
 Nor does it look whether the machine code on the disk is what it wrote, so every file begins with a hash of the rest.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import re
 import sys
 from collections.abc import Callable
 from functools import cache
@@ -22,6 +24,8 @@ from numba.core.caching import IndexDataCacheFile
 from gsl.core.compiling import count_compilation
 
 _HASH = hashlib.sha256().digest_size  # [bytes]
+_COMPILING = (b"compile_kernel", b"compile_inner")
+_IMPORT = re.compile(rb"^[ \t]*(?:from|import) (\w[\w.]*)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE)
 F = TypeVar("F", bound=Callable[..., object])
 
 
@@ -109,7 +113,26 @@ def _say_once(folder: str) -> None:
 @cache
 def _folder() -> str:
     sources = hashlib.sha256()
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+    for path in find_sources(Path(__file__).parents[1]):
         sources.update(path.read_bytes())
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return str(home / "gsl" / f"numba-{sources.hexdigest()[:12]}")
+
+
+def find_sources(package: Path) -> list[Path]:
+    """Return the files of a package that compile a function, and all of it that these import, in order."""
+    paths = {_name_module(path, package): path for path in package.rglob("*.py")}
+    contents = {name: path.read_bytes() for name, path in paths.items()}
+    waiting = [name for name, content in contents.items() if any(word in content for word in _COMPILING)]
+    sources: set[str] = set()
+    while waiting:
+        if (name := waiting.pop()) not in sources and name in contents:
+            sources.add(name)
+            for module, names in _IMPORT.findall(contents[name]):
+                whole = module.decode()
+                waiting += [whole, *(f"{whole}.{part.decode()}" for part in re.findall(rb"\w+", names))]
+    return sorted(paths[name] for name in sources)
+
+
+def _name_module(path: Path, package: Path) -> str:
+    return ".".join((package.name, *path.relative_to(package).with_suffix("").parts)).removesuffix(".__init__")

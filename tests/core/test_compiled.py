@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from gsl.core.compiled import find_sources
+
 pytestmark = pytest.mark.slow
 
 SOURCES = Path(__file__).parents[2] / "gsl"
@@ -49,6 +51,28 @@ def test_a_damaged_cache_is_compiled_again_and_said(tmp_path: Path) -> None:
     said, warned = doubled(tmp_path)
     assert said.startswith("6.0 Counter({")
     assert warned == ""
+
+
+def test_the_sources_are_what_compiled_files_import_and_no_others(tmp_path: Path) -> None:
+    package = tmp_path / "house"
+    texts = {
+        "kernel.py": "compile_kernel\nfrom house.numbers import (\n    SIZE,\n)\nfrom house import room\n",
+        "numbers.py": "SIZE = 3\n",
+        "room/__init__.py": "import house.deep.below\n",
+        "deep/below.py": "from house.numbers import SIZE\n",
+        "page.py": "from house.kernel import run\n",
+    }
+    for name, text in texts.items():
+        (package / name).parent.mkdir(parents=True, exist_ok=True)
+        (package / name).write_text(text)
+    there = [path.relative_to(package).as_posix() for path in find_sources(package)]
+    assert there == ["deep/below.py", "kernel.py", "numbers.py", "room/__init__.py"]
+
+
+def test_pages_and_imports_of_logs_are_no_sources_of_compiled_code() -> None:
+    there = {path.relative_to(SOURCES).as_posix() for path in find_sources(SOURCES)}
+    assert {"worlds/servo.py", "core/servo_law.py", "worlds/bullet_c.py", "core/servo.py"} <= there
+    assert not {name for name in there if name.startswith(("report/", "storage/", "stages/", "commandline/"))}
 
 
 def test_where_no_folder_can_be_written_it_is_compiled_every_time() -> None:
