@@ -249,8 +249,8 @@ KEEPING = {
         "motors_0",
     ),
     "process": (
-        "import multiprocessing as m; c = m.get_context('fork').Process(target=time.sleep, args=(1e6,), name='drives')\n"
-        "c.start(); open(__file__ + '.child', 'w').write(str(c.pid))",
+        "from multiprocessing import Process; c = Process(target=time.sleep, args=(1e6,), name='drives'); c.start()\n"
+        "open(__file__ + '.child', 'w').write(str(c.pid))",
         "drives",
     ),
     "end of Python": ("import atexit; atexit.register(time.sleep, 1e6)", "something"),
