@@ -252,7 +252,7 @@ def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> Di
     if OtherConfiguration.folder is not None:  # who knows how much lies in there
         return _compose_anew(command, overrides, trust)
     files = (path for folder in (configuration_folder(), *folders()) for path in folder.rglob("*.yaml"))
-    stamps = frozenset((path, (status := path.stat()).st_mtime_ns, status.st_size) for path in files)
+    stamps = frozenset((path, (status := path.stat()).st_mtime_ns, status.st_size) for path in files if path.exists())
     return _compose_once(command, tuple(overrides), tuple(trust), stamps)
 
 
@@ -269,6 +269,8 @@ def _compose_anew(command: str, overrides: Sequence[str], trust: Sequence[str]) 
     try:
         with within("putting the settings together"):  # files may name each other again and again
             config = hydra.compose_config(config_name=name, overrides=list(overrides), run_mode=RunMode.RUN, **how)
+    except AttributeError as error:  # hydra's own, of settings of hydra's that are of another kind
+        raise ConfigError("hydra", f"its settings cannot be read: {str(error).splitlines()[0]}") from error
     except RecursionError as error:
         raise InputError("yaml files name each other in a circle, in their `defaults:`") from error
     check_code(plain(_without_hydra(config)), trust, references=True)

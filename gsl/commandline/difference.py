@@ -33,6 +33,8 @@ def compare(first: str, second: str, console: Console) -> None:
         ArtifactError: There is no such artifact, or it is damaged.
     """
     left, other = (Artifact(folder, manifest.read(folder)) for folder in map(resolve_main, (first, second)))
+    for artifact in (left, other):
+        manifest.check_intact(artifact.folder, artifact.manifest)
     made = left.manifest, other.manifest
     parents = [{parent.role: parent.hash[:SHORT] for parent in each.parents} for each in made]
     roles = parents[0].keys() & parents[1].keys()  # where such a parent lies is told by its contents
@@ -53,7 +55,7 @@ def compare(first: str, second: str, console: Console) -> None:
             columns = [title, *names, *(["change"] if title == "metrics" else [])]
             console.table(f"{title}: {len(rows)} {'differ' if len(rows) > 1 else 'differs'}", columns, rows)
     causes = _compare_diagnoses((left, other), (names[0], names[1]), console)
-    same = not any(parts.values())
+    same = not any(parts.values()) and all(row["alike"] for row in causes)
     document = {**({"causes": causes} if causes else {}), "folders": [left.folder, other.folder], "same": same}
     text = f"{names[0]} and {names[1]}: the same settings, parents, software and metrics" if same else ""
     console.result({**document, **{title.replace(" ", "_"): pairs for title, pairs in parts.items()}}, text=text)

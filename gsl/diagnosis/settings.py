@@ -31,6 +31,7 @@ class RepeatSettings:
     """When two records are of the same motion: their commands, as functions of time, are the same."""
 
     same: float = 2e-3  # difference of commands that is rounding [rad]: a step of 4,096 in a turn is 1.5e-3
+    clear: float = 5.0  # times that, by which a joint has to move to say when a motion began
     of_range: float = 0.02  # share of a joint's range by which that of a repeat may differ: its peaks fall between rows
     outside: float = 0.02  # share of the rows in which commands may differ by more than a row's time makes them
     apart: float = 2.0  # by which loggers may have begun at different times [s]

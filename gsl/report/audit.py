@@ -9,7 +9,7 @@ from gsl.report.tables import Table
 
 HEADLINES = {
     "clean": "The wiring is in order",
-    "unclear": "The wiring fits, but a shift by rows and a latency look alike here",
+    "unclear": "The wiring fits, but physics and a fault look alike in one thing",
     "wiring": "It is wiring",
 }
 

@@ -5,6 +5,7 @@ What two benches with the same servos share is likely of the servo; what differs
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,6 +13,7 @@ from gsl.report.diagnosis_verdict import cause_name, verdict
 from gsl.report.diagnosis_words import NONE, Document, entries, finite, interval, name, part, value
 from gsl.report.tables import Table
 
+ROWS = 50  # at most
 SITS = {
     "command": "bus, controller or logger",
     "sensor": "sensor or logger",
@@ -36,7 +38,7 @@ def set_side_by_side(first: Document, second: Document) -> list[dict[str, Any]]:
             "sits": sits,
             "first": (left := sides[0].get((cause, parameter, sits))),
             "second": (right := sides[1].get((cause, parameter, sits))),
-            "alike": left is not None and right is not None and _are_alike(left, right),
+            "alike": _are_alike(left, right),
         }
         for cause, parameter, sits in dict.fromkeys([*sides[0], *sides[1]])
     ]
@@ -46,7 +48,7 @@ def table_of_two(first: Document, second: Document, names: tuple[str, str]) -> T
     """Return the causes of two diagnoses as a table."""
     rows = [
         (row["cause"], name(row["parameter"]), row["sits"], _show(row["first"]), _show(row["second"]), _judge(row))
-        for row in set_side_by_side(first, second)
+        for row in set_side_by_side(first, second)[:ROWS]
     ]
     verdicts = ", ".join(f"{verdict(document)} in {run}" for document, run in zip((first, second), names, strict=True))
     columns = ("cause", "parameter", "sits in", *names, "")
@@ -60,15 +62,15 @@ def _list_parameters(document: Document) -> Iterator[tuple[tuple[str, str, str],
             yield (cause_name(cause), parameter, sits), fitted
 
 
-def _are_alike(left: Document, right: Document) -> bool:
-    (a, half), (b, width) = (_read(fitted) for fitted in (left, right))
-    return abs(a - b) <= (half**2 + width**2) ** 0.5
-
-
-def _read(fitted: Document) -> tuple[float, float]:
-    """Return a value and half its 95 % interval, 0 where there is none."""
-    number, low, high = (finite(fitted.get(key)) for key in ("value", "low", "high"))
-    return number or 0.0, 0.0 if low is None or high is None else 0.5 * (high - low)
+def _are_alike(left: Document | None, right: Document | None) -> bool | None:
+    """Return whether two values are, None where one is missing, has no interval, or is in another unit."""
+    if left is None or right is None or left.get("unit") != right.get("unit"):
+        return None
+    read = [finite(side.get(key)) for side in (left, right) for key in ("value", "low", "high")]
+    if None in read:
+        return None
+    a, low, high, b, lower, higher = (number or 0.0 for number in read)
+    return abs(a - b) <= math.hypot(0.5 * (high - low), 0.5 * (higher - lower))
 
 
 def _show(fitted: Document | None) -> str:
@@ -78,4 +80,4 @@ def _show(fitted: Document | None) -> str:
 def _judge(row: Document) -> str:
     if row["first"] is None or row["second"] is None:
         return "in one alone"
-    return "alike" if row["alike"] else "differs"
+    return NONE if row["alike"] is None else "alike" if row["alike"] else "differs"

@@ -10,6 +10,7 @@ Document = Mapping[str, Any]
 """What `gsl diagnose` writes as report.json, or a part of it."""
 
 NONE = "–"
+LARGEST = 1e150  # number of a report that is shown: squares of larger ones are none any more
 REGIMES = {
     "all": "always",
     "rest": "at rest",
@@ -39,7 +40,9 @@ def part(document: Document | None, key: str) -> Document:
 
 def finite(value: Any) -> float | None:
     """Return a number, None if it is none."""
-    return float(value) if isinstance(value, int | float) and math.isfinite(value) else None
+    if isinstance(value, bool) or not isinstance(value, int | float) or abs(value) > LARGEST:
+        return None
+    return float(value) if math.isfinite(value) else None
 
 
 def read_word(document: Document, key: str) -> str:

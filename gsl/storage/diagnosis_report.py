@@ -21,10 +21,49 @@ def report_of(folder: Path) -> dict[str, Any]:
         InputError: It is no plain file, or too large.
     """
     report: dict[str, Any] = read_json(folder / REPORT)
-    if not isinstance(report, dict):
-        raise ValueError("a report holds entries by name")
+    check_shape(report)
     files = {key: (folder / report[key]).as_posix() for key in ("world_file", "report") if report.get(key)}
     wanted = report.get("next_experiment")
     if wanted and wanted.get("file"):
         files |= {"next_experiment": wanted | {"file": (folder / wanted["file"]).as_posix()}}
     return report | files
+
+
+def check_shape(report: Any) -> None:
+    """Refuse a report whose entries are of other kinds than a diagnosis writes.
+
+    Raises:
+        ValueError: They are.
+    """
+    if not isinstance(report, dict):
+        raise ValueError("a report holds entries by name")
+    experiment = report.get("next_experiment") or {}
+    texts = [report.get("world_file"), report.get("report"), experiment.get("file") if _is_by_name(experiment) else 0]
+    causes = [cause for key in ("causes", "suspects") for cause in _entries(report.get(key))]
+    if not all(text is None or isinstance(text, str) for text in texts) or not all(map(_is_cause, causes)):
+        raise ValueError("its causes or files are no such")
+
+
+def _entries(value: Any) -> list[Any]:
+    """Return a list's entries; anything else that is something counts as a wrong one."""
+    return value if isinstance(value, list) else [value] if value else []
+
+
+def _is_by_name(value: Any) -> bool:
+    return isinstance(value, dict)
+
+
+def _is_cause(cause: Any) -> bool:
+    if not _is_by_name(cause):
+        return False
+    parameters, joints = cause.get("parameters") or {}, cause.get("joints") or []
+    names = [joints] if isinstance(joints, str) else joints
+    return (
+        _is_by_name(parameters)
+        and all(map(_is_by_name, parameters.values()))
+        and isinstance(names, list)
+        and all(isinstance(name, str) for name in names)
+        and isinstance(cause.get("scope") or "", str)
+        and _is_by_name(cause.get("fixed") or {})
+        and isinstance(cause.get("effect") or "", str)
+    )

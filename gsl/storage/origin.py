@@ -11,13 +11,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gsl.core.budget import DOCUMENT_BYTES, read_text
+from gsl.core.budget import DOCUMENT_BYTES, check_file
+from gsl.core.visible import visible
+from gsl.errors import InputError
 from gsl.storage.hashing import LOG
 from gsl.storage.manifest import Parent
 
 if TYPE_CHECKING:
     from gsl.storage.artifact import Artifact
 
+WARNINGS = 50  # that a page lists
 _WARNING = re.compile(r" gsl: warning: (.*)")
 
 
@@ -51,8 +54,19 @@ class Origin:
     def warnings(self) -> tuple[str, ...]:
         """What the console has warned of since the work began, and while what it built was made: the logs have it."""
         logs = [self.folder / LOG, *(path / LOG for path in sorted(self.built))]
-        lines = [line for log in logs if log.is_file() for line in read_text(log, DOCUMENT_BYTES).splitlines()]
-        return tuple(dict.fromkeys(match[1] for line in lines if (match := _WARNING.search(line))))
+        lines = [line for log in logs for line in _read_log(log).splitlines()]
+        said = list(dict.fromkeys(visible(match[1]) for line in lines if (match := _WARNING.search(line))))
+        more = [f"{len(said) - WARNINGS} more, in the logs"] if len(said) > WARNINGS else []
+        return (*said[:WARNINGS], *more)
+
+
+def _read_log(path: Path) -> str:
+    """Return a log, or nothing of one that cannot be read: no work fails because of what it says of itself."""
+    try:
+        check_file(path, DOCUMENT_BYTES)
+        return path.read_text(encoding="utf-8", errors="replace")
+    except (InputError, OSError):
+        return ""
 
 
 _at_work: ContextVar[Origin | None] = ContextVar("at_work", default=None)

@@ -83,6 +83,8 @@ def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ())
     """
     folder = _partial(out) if progress else out.with_name(f".{out.name}.tmp-{os.getpid()}")
     with explain_refusal(out.parent):
+        if folder.is_symlink():
+            folder.unlink()
         if folder.exists() and not (is_plain(folder / KEY) and (folder / KEY).read_bytes() == key.encode()):
             shutil.rmtree(folder)
         folder.mkdir(exist_ok=True)
@@ -104,10 +106,16 @@ def destination(folder: Path) -> Path:
 
 
 def _clear(folder: Path, kept: Collection[str]) -> None:
-    """Remove what a kill left but the work does not go on from, so that it does not become part of the artifact."""
+    """Remove what a kill left but the work does not go on from, so that it does not become part of the artifact.
+
+    Links go, wherever they are: work that went on through one would write somewhere else.
+    """
+    for path in folder.rglob("*"):
+        if path.is_symlink() or not (path.is_file() or path.is_dir()):
+            path.unlink()
     for path in folder.iterdir():
         if path.name not in kept:
-            shutil.rmtree(path) if path.is_dir() and not path.is_symlink() else path.unlink()
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
     remove_temporary(folder)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 from commands import done, gsl, refused
+from strangers import seal
 
 from gsl.commandline.rerun import AGAIN
 
@@ -132,6 +133,7 @@ def test_a_run_with_a_class_of_a_colleague_is_repeated_if_it_is_trusted(tmp_path
 def test_settings_that_name_no_stage_are_refused(run: Path) -> None:
     config = run / "runs/chain/collect_sim/config.yaml"
     config.write_text("\n".join(line for line in config.read_text().splitlines() if not line.startswith("_target_")))
+    seal(config.parent)
     said = gsl("rerun", "chain/collect_sim", folder=run)
     assert (said.code, "config.yaml: names no stage" in said.lines[-1]) == (2, True)
 
@@ -139,6 +141,7 @@ def test_settings_that_name_no_stage_are_refused(run: Path) -> None:
 def test_a_rerun_of_other_parents_or_with_another_result_says_so(run: Path) -> None:
     config = run / "runs/chain/collect_sim/config.yaml"
     config.write_text(config.read_text().replace("\nseed: 1\n", "\nseed: 2\n"))
+    seal(config.parent)
     said = gsl("rerun", "chain/collect_sim", "out=again", folder=run)
     assert said.code == 1
     assert "another payload than runs/chain/collect_sim: " in said.lines[-1]
@@ -191,3 +194,11 @@ def test_a_damaged_artifact_is_shown_and_ends_in_1(run: Path) -> None:
     said = done("runs", folder=run)
     assert "chain/optimize" in said.out
     assert said.lines == ["runs/chain/collect_real: its manifest cannot be read; gsl verify says why"]
+
+
+def test_a_run_whose_settings_were_changed_is_not_run_again(run: Path) -> None:
+    config = run / "runs/chain/optimize/config.yaml"
+    config.write_text(config.read_text().replace("seed: ", "seed: 7"))
+    said = gsl("rerun", "chain/optimize", folder=run)
+    assert said.code == 2 and "config.yaml: is not as the manifest says" in said.err
+    assert not (run / "runs" / f"chain{AGAIN}").exists()

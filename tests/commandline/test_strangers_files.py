@@ -481,3 +481,8 @@ def test_a_budget_of_time_ends_a_pattern_that_never_would() -> None:
 
 def test_a_yaml_file_is_read_as_it_is(tmp_path: Path) -> None:
     assert yaml_tree(tmp_path, "a: &a [1, 2]\nb: *a\n") == {"a": [1, 2], "b": [1, 2]}
+
+
+def test_settings_of_hydra_of_another_kind_are_one_line(tmp_path: Path) -> None:
+    said = gsl("collect", "--cfg", "job", *["hydra.sweeper.params={_target_: os.system}"] * 2, folder=tmp_path)
+    assert said.code == 2 and len(said.lines) == 1 and "hydra: its settings cannot be read" in said.lines[0]

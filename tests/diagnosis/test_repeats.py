@@ -89,3 +89,23 @@ def test_repeats_of_another_clock_stay_on_one_side_of_the_split_and_count_as_one
     sides = [set(cut.pieces.record[part].tolist()) & {first, again} for part in (cut.train, cut.held_out)]
     assert cut.motions == 8 and cut.noise.source == "repeats"
     assert {first, again} in sides and set() in sides
+
+
+def hold(time: np.ndarray) -> np.ndarray:
+    """Two joints that are held, one of them by a controller that trembles a little."""
+    return 0.3 + 4e-4 * np.stack([np.zeros_like(time), np.sin(40.0 * time)], axis=-1)
+
+
+@pytest.mark.parametrize("rows", [40, 400])
+def test_held_joints_say_nothing_of_when_a_motion_began(rows: int) -> None:
+    again = record(lambda time: hold(time) + 1e-5, begun=0.013, seed=1, rows=rows)
+    assert find_repeats([record(hold, rows=rows), again], PERIOD) == [Repeat(0), Repeat(0)]
+
+
+@pytest.mark.parametrize("rows", [1, 2, 9])
+def test_records_of_few_rows_are_no_repeats(rows: int) -> None:
+    def short(seed: int) -> Record:
+        whole = record(sines, begun=1e-3 * seed, seed=seed)
+        return replace(whole, targets=whole.targets[50 : 50 + rows], position=whole.position[50 : 51 + rows])
+
+    assert [repeat.motion for repeat in find_repeats([short(0), short(1)], PERIOD)] == [0, 1]

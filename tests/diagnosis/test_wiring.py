@@ -57,6 +57,18 @@ def test_a_fault_is_named_with_its_joints(kind: str) -> None:
     assert named == set(case.joints)
 
 
+@pytest.mark.parametrize("kind", ["rate", "hold", "gains"])
+def test_of_one_motion_alone_a_fault_that_physics_resembles_is_a_doubt(kind: str) -> None:
+    """Friction of a real servo looks like one where a log shows no other motion: five of 17 motions of an SO-101."""
+    case = wire(kind, PLAN.commands[:1], logged, nominal(arm()), np.random.default_rng(3))
+    audit = audited(case.log, case.plant)
+    assert audit.verdict in ("unclear", "clean") and not audit.spoils
+
+
+def test_of_one_motion_alone_a_sign_is_a_fault() -> None:
+    assert audited(change(logged(PLAN.commands[:1]), position=lambda x: x * [1.0, -1.0])).verdict == "wiring"
+
+
 @pytest.mark.parametrize(
     "effects",
     [

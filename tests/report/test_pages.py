@@ -7,7 +7,7 @@ import hashlib
 import math
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -30,6 +30,7 @@ from gsl.report.study_page import write_study_page
 from gsl.report.style import COLOURS, curve_figure, look
 from gsl.rollout.promise import promise
 from gsl.storage.artifact import build
+from gsl.storage.origin import Origin
 from gsl.storage.policies import PolicyRecord
 
 HOSTILE = "<script>alert(1)</script>\"' onload='x' $\\frac{"
@@ -278,3 +279,17 @@ def test_text_is_escaped_once_and_markup_never() -> None:
     assert join("<", None, element("b", ">")) == "&lt;<b>&gt;</b>"
     assert '<th scope="row">&lt;a&gt;</th><td>\ufffd</td>' in table(("x",), [("<a>", "\u202e")])
     assert prose("97 % of 3 ms at 2 cm/s") == "97\u00a0% of 3\u00a0ms at 2\u00a0cm/s"
+
+
+def test_a_log_that_cannot_be_read_costs_no_page_its_warnings(tmp_path: Path) -> None:
+    """Torn in the middle of a letter, a link to nowhere, far too many, with a terminal's escapes."""
+    folders = [tmp_path / name for name in ("own", "torn", "nowhere")]
+    for folder in folders:
+        folder.mkdir()
+    many = [f"x gsl: warning: number {k}\x1b[2J" for k in range(80)]
+    (folders[0] / "log.txt").write_text("\n".join(many))
+    (folders[1] / "log.txt").write_bytes(b"x gsl: warning: half a letter \xcf")
+    (folders[2] / "log.txt").symlink_to("/proc/kmsg")
+    built = cast(Any, dict.fromkeys(folders[1:]))
+    warnings = Origin("gsl x", "", (), folders[0], built).warnings
+    assert warnings[0] == "number 0\\u001b[2J" and len(warnings) == 51 and warnings[-1] == "31 more, in the logs"

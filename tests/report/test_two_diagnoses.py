@@ -1,6 +1,9 @@
 """Two diagnoses side by side: what their causes share, and what is of one alone."""
 
+import math
 from typing import Any
+
+import pytest
 
 from gsl.report.diagnosis_two import set_side_by_side, table_of_two
 
@@ -29,7 +32,7 @@ SECOND = {
 def test_values_are_alike_where_the_interval_of_their_difference_holds_nothing() -> None:
     rows = {(row["cause"], row["parameter"]): row for row in set_side_by_side(FIRST, SECOND)}
     alike = {parameter: row["alike"] for (_, parameter), row in rows.items()}
-    assert alike == {"torque": True, "kp": False, "kd": True, "delay": False}
+    assert alike == {"torque": True, "kp": False, "kd": True, "delay": None}
     late = rows["command latency of all joints", "delay"]
     assert late["sits"] == "bus, controller or logger" and late["first"] is None and late["second"]["value"] == 0.034
 
@@ -43,3 +46,22 @@ def test_the_table_says_what_is_of_one_alone() -> None:
 
 def test_nothing_is_no_row() -> None:
     assert table_of_two({"verdict": "no_gap"}, {"verdict": "no_gap"}, ("a", "b")).rows == []
+
+
+UNSURE = cause("servo_gain", "servo", kp=(0.5, 0.02))
+
+
+@pytest.mark.parametrize(
+    "damage", [{"value": None}, {"value": math.nan}, {"low": None}, {"high": 1e308}, {"unit": "rad"}]
+)
+def test_a_value_of_which_too_little_is_known_is_neither_alike_nor_different(damage: dict[str, Any]) -> None:
+    plain = {"verdict": "causes", "causes": [UNSURE]}
+    strange = {**UNSURE, "parameters": {"kp": {**UNSURE["parameters"]["kp"], **damage}}}
+    other = {"verdict": "causes", "causes": [strange]}
+    assert [row["alike"] for row in set_side_by_side(plain, other)] == [None]
+    assert [row[-1] for row in table_of_two(plain, other, ("a", "b")).rows] == ["–"]
+
+
+def test_a_table_has_an_end() -> None:
+    many = [cause("coulomb_friction", "servo", **{f"p{k}": (0.1, 0.01)}) for k in range(200)]
+    assert len(table_of_two({"causes": many}, {"causes": many}, ("a", "b")).rows) == 50

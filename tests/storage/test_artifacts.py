@@ -397,6 +397,31 @@ def test_a_parent_that_is_exchanged_while_a_stage_works_is_refused(out: Path, tm
         assert not out.parent.exists()
 
 
+@pytest.mark.parametrize("linked", ["progress", "log.txt", "metrics.jsonl", ".key", "sub", ""])
+def test_work_that_a_stranger_left_writes_through_no_link(linked: str, out: Path, tmp_path: Path) -> None:
+    def dying(folder: Path) -> None:
+        (folder / "progress").write_text("half")
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        built(Resumable(ending=dying), out)
+    partial, mine = out.with_name(f".{out.name}.partial"), tmp_path / "mine"
+    place = partial / linked if linked else partial
+    if linked in ("sub", ""):
+        if place.exists():
+            place.rename(mine)
+        mine.mkdir(exist_ok=True)
+    else:
+        mine.write_text("my own diary" if linked != ".key" else place.read_text())
+        place.unlink(missing_ok=True)
+    place.symlink_to(mine)
+    before = {path: path.read_text() for path in (mine, *mine.rglob("*")) if path.is_file()}
+    made = built(Resumable(), out)
+    assert {path: path.read_text() for path in (mine, *mine.rglob("*")) if path.is_file()} == before
+    assert not any(path.is_symlink() for path in out.rglob("*")) and not out.is_symlink()
+    assert "progress" not in made.manifest.files or (out / "progress").read_text() != "my own diary"
+
+
 def test_what_a_kill_left_beside_the_progress_is_no_part_of_the_artifact(out: Path) -> None:
     """Half a payload, the temporary name of another one, a file of a stage that would write it only sometimes."""
 

@@ -91,3 +91,15 @@ def test_what_a_reader_would_refuse_is_not_written(tmp_path: Path) -> None:
     with pytest.raises(ArtifactError, match="period"):
         write_policies(tmp_path / "policies.json", dataclasses.replace(POLICIES, records=(record,)))
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "damage", [{"generation": {"a": 1}}, {"generation": 1.5}, {"generation": True}, {"notes": [1]}]
+)
+def test_a_generation_is_a_whole_number_and_notes_have_names(damage: dict[str, object], tmp_path: Path) -> None:
+    path = tmp_path / "policies.json"
+    write_policies(path, Policies({"_target_": "x"}, "walk", (PolicyRecord("pi0", {"a": 1.0}),)))
+    stored = json.loads(path.read_text())
+    path.write_text(json.dumps({**stored, "policies": [{**stored["policies"][0], **damage}]}))
+    with pytest.raises(ArtifactError, match="generation is no whole number, or its notes"):
+        read_policies(path)

@@ -32,7 +32,7 @@ YAMLS_WITH_CODE = (
     "a: !!python/module:canary_module\n",
 )
 WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT
-CACHES = ("__pycache__", "numba", "matplotlib")
+CACHES = ("torchinductor_", "__pycache__", "numba", "matplotlib")
 CHANGES = ("os.rename", "os.remove", "os.mkdir", "os.rmdir", "os.truncate", "shutil.rmtree")
 
 

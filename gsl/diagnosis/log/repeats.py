@@ -17,6 +17,8 @@ from gsl.diagnosis.log.records import Record
 from gsl.diagnosis.settings import RepeatSettings
 
 DIGITS = 6  # of commands [rad] that are equal row by row
+ROUNDING = 1e-9  # of a correlation: where several lags fit as well, the least counts
+FEW = 10  # rows, below which two records are too short to be compared
 
 
 class Repeat(NamedTuple):
@@ -62,21 +64,25 @@ def _find(record: Record, firsts: Sequence[Record], period: float, how: RepeatSe
 
 def _compare(first: np.ndarray, again: np.ndarray, period: float, how: RepeatSettings) -> float | None:
     """Return by how many rows the same commands, shape (T, width), come later in another record; None for others."""
-    if first.shape[1] != again.shape[1] or min(len(first), len(again)) < how.share * max(len(first), len(again)):
+    lengths = len(first), len(again)
+    if first.shape[1] != again.shape[1] or min(lengths) < max(FEW, how.share * max(lengths)):
+        return None
+    if not (np.isfinite(first).all() and np.isfinite(again).all()):
         return None
     extents = np.array([[part.min(axis=0), part.max(axis=0)] for part in (first, again)])
     if (np.abs(extents[0] - extents[1]) > how.same + how.of_range * np.ptp(extents[0], axis=0)).any():
         return None
-    later = _align(first, again, round(how.apart / period))
+    moving = np.ptp(first, axis=0) > how.clear * how.same
+    later = _align(first[:, moving], again[:, moving], round(how.apart / period)) if moving.any() else 0
     before, after = _overlap(first, again, later)
-    if len(before) < how.share * max(len(first), len(again)):
+    if len(before) < how.share * max(lengths):
         return None
     padded = np.pad(before, ((1, 1), (0, 0)), mode="edge")
     near = np.array([padded[:-2], padded[1:-1], padded[2:]])  # a row late or early is the logger's
     outside = (after < near.min(axis=0) - how.same) | (after > near.max(axis=0) + how.same)
     if outside.mean(axis=0).max() > how.outside:
         return None
-    return later + _refine(before, after)
+    return later + (_refine(before[:, moving], after[:, moving]) if moving.any() else 0.0)
 
 
 def _align(first: np.ndarray, again: np.ndarray, most: int) -> int:
@@ -85,7 +91,8 @@ def _align(first: np.ndarray, again: np.ndarray, most: int) -> int:
     alike = sum(correlate(b[:, k], a[:, k], method="fft") for k in range(a.shape[1]))
     lags = np.arange(1 - len(a), len(b))
     own = np.abs(lags) <= most
-    return int(lags[own][np.argmax(alike[own])])
+    best = alike[own] >= (1.0 - ROUNDING) * alike[own].max()
+    return int(min(lags[own][best], key=abs))
 
 
 def _overlap(first: np.ndarray, again: np.ndarray, later: int) -> tuple[np.ndarray, np.ndarray]:

@@ -55,7 +55,7 @@ class Audit:
         stands = self.wiring.stands if self.wiring else ()
         if self.signals or stands or self.seen:
             return WIRING
-        return UNCLEAR if self.wiring and self.wiring.late else CLEAN
+        return UNCLEAR if self.wiring and (self.wiring.late or self.wiring.doubted) else CLEAN
 
     @property
     def spoils(self) -> bool:
@@ -131,6 +131,9 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
             wiring = Search(take_part(mended), plant, step, floor, excluded, tick).run()
         except GslError as error:
             remarks.append(f"Nothing was replayed: {error}.")
+    if wiring and wiring.doubted:
+        like = describe(wiring.doubted, batch.joints, batch.control_period)
+        remarks.insert(0, f"Too little to tell wiring from physics: {like} Larger and other motions would tell.")
     if wiring and wiring.late:
         rows = f"{wiring.late} row{'s' * (wiring.late > 1)}"
         delay = f"{1e3 * wiring.late * batch.control_period:.4g} ms"

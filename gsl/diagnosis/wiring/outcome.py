@@ -31,6 +31,8 @@ class Wiring:
     Attributes:
         stands: Faults, in the order in which they were found.
         before, after: The best physics of the log as it is, and of the mended log.
+        doubted: A fault that would stand, were there more than one motion and a larger gap: friction or soft gains may
+            do the same.
         late: By how many whole rows all commands act later, 0 if by none: a shift, or a latency.
     """
 
@@ -38,3 +40,4 @@ class Wiring:
     before: Fit
     after: Fit
     late: int
+    doubted: Fault | None = None

@@ -44,7 +44,7 @@ def remedy(fault: Fault, joints: Sequence[str]) -> str:
         "sign": f"Say sign: {{{signs}}} for {signal} in the mapping.",
         "scale": f"{unit} for {signal} in the mapping.",
         "offset": f"Say the offset of these joints for {signal} in the mapping.",
-        "gains": "Give the simulator the robot's gains (world.effects.servo_gain), and look at their units.",
+        "gains": "Give the simulator the robot's gains (sim.effects.servo_gain), and look at their units.",
         "rate": "Say the true rate: the unit of time, or its period, in the mapping.",
         "hold": "Log the commands that the robot takes, or let it take all of them.",
         "shift": "Write a command into the row whose state was measured before it.",
