@@ -160,10 +160,10 @@ def init(
     json: Json = False,
 ) -> None:
     """Write the configuration of your own robot from its URDF."""
-    from gsl.commandline.composer import configuration_folder
     from gsl.commandline.init import write_configuration
+    from gsl.core.configuration import list_worlds
 
-    worlds = [path.stem for path in (configuration_folder() / "world").glob("*.yaml")]
+    worlds = list_worlds()
     write_configuration(settings or [], worlds, Console(json=json))
 
 

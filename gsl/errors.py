@@ -15,6 +15,14 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+SHOWN = 60
+"""Letters of a name in a message; what a file calls its columns may be a hundred thousand letters long."""
+
+
+def shorten(name: str) -> str:
+    """Return a name as a message has room for it."""
+    return name if len(name) <= SHOWN else f"{name[: SHOWN - 3]}..."
+
 
 class GslError(Exception):
     """Something a user can understand and mend."""
@@ -89,7 +97,7 @@ class TrajectoryError(InputError):
         row: int | None = None,
         line: int | None = None,
     ) -> None:
-        places = (("column", column), ("row", row), ("line", line))
+        places = (("column", column and shorten(column)), ("row", row), ("line", line))
         where = "".join(f", {name} {place}" for name, place in places if place not in (None, ""))
         super().__init__(f"{path}{where}: {problem}")
         self.path, self.problem, self.column, self.row, self.line = Path(path), problem, column, row, line

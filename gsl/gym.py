@@ -11,7 +11,7 @@ from typing import Any
 import gymnasium
 
 from gsl.api import make_world
-from gsl.commandline.composer import configuration_folder
+from gsl.core.configuration import list_worlds
 
 NAMESPACE = "gsl"
 LEFT_OUT = ("robot", "urdf", "learned", "gymnasium")  # need something named before they are a world
@@ -24,7 +24,7 @@ def make(name: str, **settings: Any) -> gymnasium.Env:
 
 def register() -> list[str]:
     """Register every world of ours, and return the ids."""
-    names = sorted(path.stem for path in (configuration_folder() / "world").glob("*.yaml") if path.stem not in LEFT_OUT)
+    names = sorted(list_worlds() - set(LEFT_OUT))
     for name in names:
         gymnasium.register(
             f"{NAMESPACE}/{name}-v0", entry_point="gsl.gym:make", kwargs={"name": name}, disable_env_checker=True

@@ -29,6 +29,7 @@ from gsl.commandline.own_word import check_own_word, find_own_modules, find_trus
 from gsl.commandline.plugins import folders, packages
 from gsl.commandline.yaml_files import USER, BudgetedFiles, load_plugins
 from gsl.core.budget import within
+from gsl.core.configuration import configuration_folder
 from gsl.core.setting import Setting
 from gsl.core.trust import TARGET, check_code, is_ours
 from gsl.core.validation import did_you_mean
@@ -75,13 +76,6 @@ class OtherConfiguration(SearchPathPlugin):
 def commands() -> list[str]:
     """Return the names of the yaml files of all stages, ours and those of plugins."""
     return sorted(path.stem for folder in (configuration_folder(), *folders()) for path in folder.glob("*.yaml"))
-
-
-def configuration_folder() -> Path:
-    """Return the folder of our yaml files: inside the wheel, or at the top of the repository."""
-    here = Path(__file__).resolve().parents[1]
-    packed = here / "_conf"
-    return packed if packed.is_dir() else here.parent / "conf"
 
 
 @contextmanager

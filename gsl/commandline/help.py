@@ -10,12 +10,13 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from gsl.commandline.composer import compose, configuration_folder, groups, open_hydra, options
+from gsl.commandline.composer import compose, groups, open_hydra, options
 from gsl.commandline.config import WORKERS, CommandSettings, resolve
 from gsl.commandline.known_settings import plain, read_declared
 from gsl.commandline.overrides import EXECUTOR_KEYS, OPTIONAL_GROUPS
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
+from gsl.core.configuration import configuration_folder
 from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.effects.effect import effect_class, names
 from gsl.errors import ConfigError, GslError

@@ -6,7 +6,6 @@ import os
 import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from difflib import get_close_matches
 from importlib.machinery import PathFinder
 from typing import Any
 
@@ -14,6 +13,7 @@ from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import ChoiceSweep, QuotedString
 from hydra.errors import HydraException
 
+from gsl.core.likeness import find_alike
 from gsl.core.trust import TRUST, modules_in
 from gsl.errors import ConfigError
 
@@ -38,7 +38,7 @@ def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
     """
     named = [word for word in os.environ.get(VARIABLE, "").replace(",", " ").split()]
     for key, value in _split_words(arguments):
-        if key != TRUST and get_close_matches(key, [TRUST], cutoff=ALIKE):
+        if key != TRUST and find_alike(key, [TRUST], cutoff=ALIKE):
             raise ConfigError(key, f"no such setting; did you mean {TRUST}?")
         named += modules_of(value) if key == TRUST else modules_in({key.rpartition(".")[2]: value})
     return tuple(dict.fromkeys(named))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, TypeVar
@@ -10,9 +9,10 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 from pydantic_core import ArgsKwargs, ErrorDetails
 
+from gsl.core.likeness import find_alike
 from gsl.core.setting import settings_of
 from gsl.core.trust import TARGET
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, shorten
 
 T = TypeVar("T")
 
@@ -86,11 +86,11 @@ def did_you_mean(word: str, candidates: Iterable[str], *, listed: bool = False) 
     """Return `; did you mean ...?` and, where nothing is near or `listed`, the list of what there is."""
     names = sorted(candidates)
     alike = {name.casefold(): name for name in names}
-    near = [alike[match] for match in difflib.get_close_matches(word.casefold(), alike, n=2, cutoff=0.6)]
+    near = [shorten(alike[match]) for match in find_alike(word.casefold(), alike, most=2)]
     question = f"; did you mean {' or '.join(near)}?" if near else ""
     if near and not listed or not names:
         return question
-    return f"{question}{' T' if near else '; t'}here is {', '.join(names)}"
+    return f"{question}{' T' if near else '; t'}here is {', '.join(map(shorten, names))}"
 
 
 def _problems(complaints: Sequence[ErrorDetails]) -> str:

@@ -7,7 +7,6 @@ by the name of its yaml file (`use_own`), or is named by `_target_`.
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import pkgutil
 import re
@@ -20,6 +19,7 @@ from typing import Any, ClassVar, Literal, Protocol, get_origin, get_type_hints,
 import numpy as np
 
 from gsl.core.body import Link, Robot
+from gsl.core.likeness import find_alike
 from gsl.core.plant import Plant
 from gsl.core.setting import REQUIRED, Setting, settings_of
 from gsl.core.validation import make
@@ -121,7 +121,7 @@ def effect_class(name: str) -> type:
     if name in _WITHHELD:
         raise _WITHHELD[name]
     if name not in names():
-        near = difflib.get_close_matches(name, names(), 1)
+        near = find_alike(name, names())
         hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names())}"
         raise ConfigError(f"effects.{name}", f"no effect of this name; {hint}")
     module = importlib.import_module(f"gsl.effects.{name}")
@@ -233,7 +233,7 @@ def scope(plant: Plant, joints: Scope) -> np.ndarray:
         return plant.mask(joints)
     except KeyError as error:
         names = ("all", *plant.robot.groups, *plant.robot.motors)
-        near = difflib.get_close_matches(str(error.args[0]), names, 1)
+        near = find_alike(str(error.args[0]), names)
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(names)}"
         raise ConfigError("joints", f"the {plant.robot.name} has no joint or group '{error.args[0]}'; {hint}") from None
 
@@ -246,7 +246,7 @@ def link_named(plant: Plant, name: str) -> Link:
     """
     links = plant.robot.links
     if name not in links:
-        near = difflib.get_close_matches(name, links, 1)
+        near = find_alike(name, links)
         hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(links)}"
         raise ConfigError("link", f"the {plant.robot.name} has no link '{name}'; {hint}")
     return links[name]

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gsl.core.budget import DOCUMENT_BYTES, read_json, read_text
+from gsl.core.configuration import list_worlds
 from gsl.core.unit import Unit
 from gsl.core.words import in_unit
 from gsl.errors import InputError
@@ -20,6 +21,7 @@ from gsl.report.evaluation_cells import cells, columns, outcomes_beside
 from gsl.report.headline import unit_of
 from gsl.report.markdown import read_table
 from gsl.report.tables import Table
+from gsl.robots import catalogue
 from gsl.storage.artifact import METRICS, Artifact
 from gsl.storage.diagnosis_report import report_of
 from gsl.storage.hashing import CIRCUMSTANCES, PAGE
@@ -55,8 +57,10 @@ def _import(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     }
     caption = "; ".join([metrics["time"], f"velocities {metrics['velocity']}", *metrics["warnings"]])
     log = shlex.quote(str(folder))
-    following = f"what to type next, with a simulator of the robot as sim:\n  gsl audit real={log} sim=...\n"
-    following += f"  gsl diagnose real={log} sim=..."
+    robot = metrics.get("robot")
+    world = robot if robot in catalogue.names() and robot in list_worlds() else ""
+    following = f"what to type next{'' if world else ', with a simulator of the robot as sim'}:\n"
+    following += "\n".join(f"  gsl {command} real={log} sim={world or '...'}" for command in ("audit", "diagnose"))
     return Table("imported trajectories", tuple(row), [tuple(map(str, row.values()))], f"{caption}\n{following}")
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import os
 import signal
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +19,7 @@ from gsl.runner.request import due, read_request
 from gsl.runner.robots import PerfectRobot, robot_of
 from gsl.runner.saying import say
 from gsl.runner.senses import RobotError
-from gsl.runner.watch import SIGNALS, Hangs, is_stuck
+from gsl.runner.watch import SIGNALS, Hangs
 
 LATE = 0.002  # of a tick, that is worth telling [s]
 OFF = 0.5  # of a tick, from which on a log is refused, in periods
@@ -37,14 +36,7 @@ def main(folder: Path, words: Sequence[str]) -> int:
     parser.add_argument("--yes", action="store_true", help="ask nothing")
     parser.add_argument("--unpaced", action="store_true", help="do not wait for the clock: for a simulated robot")
     parser.add_argument("--trust", action="append", default=[], metavar="MODULE", help="whose policy may be run")
-    code = _run(folder, parser.parse_args(words))
-    if is_stuck():  # what hangs may keep the process from its end as well
-        os._exit(code)
-    return code
-
-
-def _run(folder: Path, asked: argparse.Namespace) -> int:
-    """Do what is asked and return the exit code."""
+    asked = parser.parse_args(words)
     for name in SIGNALS:  # hold, ramp out, keep what is complete; in a background job as well
         if hasattr(signal, name):
             signal.signal(getattr(signal, name), signal.default_int_handler)

@@ -37,7 +37,10 @@ def alone(folder: Path) -> Iterator[None]:
         file.truncate(0)
         file.write(f"{os.getpid()}\n")
         file.flush()
-        yield
+        try:
+            yield
+        finally:  # a process that the robot's file has forked has the file open as well, and may outlive this one
+            fcntl.flock(file, fcntl.LOCK_UN)
 
 
 def check_writable(log: Path) -> None:

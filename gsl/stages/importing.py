@@ -69,6 +69,7 @@ class Import:
         write(folder / FILE, self._batch(imported, document, chosen.mapping))
         return {key: document[key] for key in ("files", "control_period", "time", "velocity", "warnings")} | {
             "episodes": len(imported),
+            "robot": chosen.mapping.robot,
             "joints": list(imported[0].joints),
             "steps": sum(len(episode.trajectory) for episode in imported),
             "seconds": sum(float(episode.trajectory.time[-1]) for episode in imported),

@@ -126,7 +126,10 @@ def changes(old: Manifest, old_config: Any, new: Identity, new_config: Any) -> s
     words = _list_changes(before, new.settings)
     hashes = {parent.role: parent.hash for parent in old.parents}
     roles = sorted(hashes.keys() | new.parents.keys())
-    words += [f"the data of {role}" for role in roles if hashes.get(role) != new.parents.get(role)]
+    others = [f"the data of {role}" for role in roles if hashes.get(role) != new.parents.get(role)]
+    words += others[:SHOWN_CHANGES]
+    if len(others) > SHOWN_CHANGES:
+        words[-1] += f" and {len(others) - SHOWN_CHANGES} more"
     if old.sources != new.sources or not words:
         words.append("gsl itself")
     return "changed: " + ", ".join(words)

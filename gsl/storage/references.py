@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import difflib
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
+from gsl.core.likeness import find_alike
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
@@ -128,13 +128,13 @@ def _alternatives(reference: str, runs: Path) -> str:
     run, _, stage = reference.rpartition("/")
     inside = [name_run(artifact.folder, runs) for artifact in _artifacts(runs)]
     last = {name: name.rpartition("/")[2] for name in inside if run and name.startswith(f"{run}/")}
-    if meant := difflib.get_close_matches(stage, sorted({*last.values()}), n=1, cutoff=ALIKE):
+    if meant := find_alike(stage, sorted({*last.values()}), cutoff=ALIKE):
         deeper = [name for name in last if last[name] == meant[0]]
         return f", did you mean {' or '.join(deeper[:ALTERNATIVES])}?"
     maker = f"; gsl {MAKERS[stage]} name={run} makes it" if run and stage in MAKERS else ""
     there = runs.iterdir() if runs.is_dir() else ()
     names = {path.name for path in there if path.exists() and not path.name.startswith(".")}
-    close = difflib.get_close_matches(reference, sorted({*names, *inside}), n=1, cutoff=0.85 if maker else 0.6)
+    close = find_alike(reference, sorted({*names, *inside}), cutoff=0.85 if maker else 0.6)
     return f", did you mean {close[0]}?" if close else maker
 
 

@@ -58,6 +58,7 @@ def send(targets):
 # All of them are called in one thread, which is not the one that has loaded this file.
 # def begin(episode): called when the robot stands at the start, just before the first step
 # def end(): called when it is back there
+# At the end of Python, what atexit, threads or processes of this file still do has 2 s; then it is ended.
 '''
 
 

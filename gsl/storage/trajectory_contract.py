@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from gsl.core.budget import COLUMNS, find_repeat
-from gsl.errors import TrajectoryError
+from gsl.core.likeness import find_alike
+from gsl.errors import TrajectoryError, shorten
 
 SCHEMA_VERSION = 1
 ROLES = ("real", "sim", "imported")
@@ -228,8 +228,8 @@ def _refuse(path: Path, column: str, wrong: np.ndarray, problem: str, *, first: 
 
 def suggestion(name: str, choices: Iterable[str]) -> str:
     """Return `, did you mean ...?` when one of `choices` resembles `name`, else nothing."""
-    close = difflib.get_close_matches(name, sorted(choices), n=1, cutoff=0.75)
-    return f", did you mean {close[0]}?" if close else ""
+    close = find_alike(name, sorted(choices), cutoff=0.75)
+    return f", did you mean {shorten(close[0])}?" if close else ""
 
 
 def _short(value: Any) -> str:

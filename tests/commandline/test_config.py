@@ -10,11 +10,12 @@ import yaml
 from example_stage import ExampleWorld
 
 from gsl.cli import call
-from gsl.commandline.composer import compose, configuration_folder, open_hydra
+from gsl.commandline.composer import compose, open_hydra
 from gsl.commandline.config import prepare, resolve
 from gsl.commandline.failure import describe_failure
 from gsl.commandline.multirun import job_level
 from gsl.commandline.plugins import folders
+from gsl.core.configuration import configuration_folder
 from gsl.core.described import describe, restore
 from gsl.errors import ConfigError
 

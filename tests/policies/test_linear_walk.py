@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from gsl.commandline.composer import configuration_folder
+from gsl.core.configuration import configuration_folder
 from gsl.core.layout import Layout
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding

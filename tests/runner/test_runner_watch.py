@@ -248,6 +248,11 @@ KEEPING = {
         "import concurrent.futures as f; pool = f.ThreadPoolExecutor(1, 'motors'); pool.submit(time.sleep, 1e6)",
         "motors_0",
     ),
+    "process": (
+        "from multiprocessing import Process; c = Process(target=time.sleep, args=(1e6,), name='drives'); c.start()\n"
+        "open(__file__ + '.child', 'w').write(str(c.pid))",
+        "drives",
+    ),
     "end of Python": ("import atexit; atexit.register(time.sleep, 1e6)", "something"),
 }
 
@@ -261,6 +266,47 @@ def test_what_a_robots_file_has_started_does_not_keep_the_runner(walk: Path, tmp
     assert (process.returncode, process.stderr) == (0, "")
     assert process.stdout.splitlines()[-1] == said
     assert (tmp_path / "answer.csv").read_text().count("\n") > 10
+    for child in tmp_path.glob("*.child"):
+        with pytest.raises(ProcessLookupError):
+            os.kill(int(child.read_text()), 0)
+
+
+def test_a_fork_that_outlives_the_runner_does_not_keep_the_lock(walk: Path, tmp_path: Path) -> None:
+    path, forks = robot(tmp_path, SLEEPS, "anywhere", "", 0, ""), "import os\nif not os.fork():\n"
+    path.write_text(f"{path.read_text()}\n{forks}    os.closerange(0, 3)\n    time.sleep(10)\n    os._exit(0)\n")
+    words = (f"--robot={path}", f"--log={tmp_path / 'answer.csv'}", "--yes", "--unpaced")
+    assert [run(walk, *words).returncode for _ in range(2)] == [0, 0]
+
+
+ENDS = """
+import sys, threading, time
+from pathlib import Path
+sys.path.insert(0, "modules")
+from gsl.runner import process
+PLACE = Path(sys.argv[1])
+process.main = lambda folder, words: 0
+def say(text):
+    raise ValueError("nobody hears")
+class Hangs:
+    def __del__(self, sleep=time.sleep):
+        sleep(1e6)
+def keep():
+    threading.Thread(target=time.sleep, args=(1e6,)).start()
+"""
+FINISHES = {
+    "main raises": ("def main(*words):\n    keep()\n    1 / 0\nprocess.main = main", "ZeroDivisionError", 1),
+    "nobody hears": ("process.say = say; keep()", "", 0),
+    "a __del__ hangs": ("late = Hangs()", "", 1),
+    "an interrupt": ("import signal\nthreading.Timer(1, signal.raise_signal, [signal.SIGINT]).start(); keep()", "", 0),
+}
+
+
+@pytest.mark.parametrize("how", FINISHES)
+def test_the_process_ends_whatever_goes_wrong_at_its_end(walk: Path, tmp_path: Path, how: str) -> None:
+    change, words, code = FINISHES[how]
+    line = [sys.executable, "-I", "-c", f"{ENDS}{change}\nprocess.run(PLACE, [])", str(tmp_path)]
+    done = subprocess.run(line, cwd=walk, capture_output=True, text=True, timeout=30, check=False)
+    assert done.returncode == code and (words in done.stderr if words else done.stderr == "")
 
 
 def resealed(walk: Path, folder: Path, change: str, value: object) -> Path:

@@ -25,6 +25,7 @@ from gsl.errors import ArtifactError, GslError
 from gsl.storage import hashing, manifest
 from gsl.storage.artifact import Artifact, build
 from gsl.storage.documents import write_json
+from gsl.storage.identity import Identity, changes
 from gsl.storage.workplace import complete
 
 pytestmark = pytest.mark.slow
@@ -192,6 +193,13 @@ def test_a_parent_counts_by_its_contents_and_not_by_its_place(out: Path, tmp_pat
     third = built(Doubling(4), tmp_path / "third").folder
     with pytest.raises(ArtifactError, match=r"changed: the data of data\)"):
         built(Doubling(data=third), out)
+
+
+def test_many_parents_of_other_contents_are_named_in_part(out: Path) -> None:
+    manifest = built(Doubling(), out).manifest
+    identity = Identity(manifest.kind, {}, {f"source {k:02}": "0" for k in range(45)}, manifest.sources)
+    words = ", ".join(f"the data of source {k:02}" for k in range(3))
+    assert changes(manifest, {}, identity, {}) == f"changed: {words} and 42 more"
 
 
 def test_a_file_is_a_parent_by_its_contents(out: Path, tmp_path: Path) -> None:

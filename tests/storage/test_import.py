@@ -307,6 +307,15 @@ def test_a_run_of_import_is_a_log_for_a_diagnosis(tmp_path: Path, monkeypatch: p
     assert read_logs("log").metadata == batch.metadata
 
 
+@pytest.mark.parametrize(("robot", "world"), [("so101", "so101"), ("go2", "..."), ("urdf", "..."), ("unknown", "...")])
+def test_what_to_type_next_names_the_world_of_a_robot_that_has_one(tmp_path: Path, robot: str, world: str) -> None:
+    source, chosen = csv(tmp_path / "log.csv", plain()), mapping(tmp_path / "m.yaml")
+    said = done("import", f"source={source}", chosen, f"mapping.robot={robot}", "name=log", folder=tmp_path).out
+    for command in ("audit", "diagnose"):
+        assert f"\n  gsl {command} real=runs/log/import sim={world}\n" in said
+    assert ("with a simulator of the robot as sim" in said) == (world == "...")
+
+
 def test_a_mapping_may_lie_anywhere(tmp_path: Path) -> None:
     place = tmp_path / "my lab's" / "arm = 1"
     place.mkdir(parents=True)

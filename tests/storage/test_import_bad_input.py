@@ -205,6 +205,7 @@ FILES = {
         b"t,goal_shoulder,goal_elbow,q_shoulder,q_elbow\n0,0,0,0,0\n1,2,3,4,5,6,7\n",
         "rows of another length",
     ),
+    "name.csv": (b"t," + b"q" * 140_000 + b"\n0,0\n", "cannot be taken apart: field larger than field limit"),
     "twice.csv": (b"t,t,q_shoulder\n0,0,0\n1,1,1\n", "several columns of this name"),
     "endless.csv": (b"t,q\n" + b"1" * 5_000_000, "has a line of more than"),
     "what.xlsx": (b"PK", r"\.xlsx is no format that is read; there is \.csv"),
@@ -217,6 +218,13 @@ def test_a_file_that_is_not_what_it_seems_is_one_clear_line(tmp_path: Path, name
     (tmp_path / name).write_bytes(content)
     line = told(tmp_path, tmp_path / name)
     assert name in line and re.search(words, line), line
+
+
+def test_a_wrong_cell_far_down_is_one_line(tmp_path: Path) -> None:
+    rows = [f"{0.01 * k:.2f},0.1,0.1,0.1,0.1" for k in range(300_000)]
+    rows[290_000] = "2900.00,0.1,0.1,x,0.1"
+    (tmp_path / "log.csv").write_text("\n".join([",".join(plain()), *rows]) + "\n")
+    assert "line 290002: 'x' is not a number" in told(tmp_path, tmp_path / "log.csv")
 
 
 def test_objects_in_an_npz_are_not_unpickled(tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import gzip
 import io
 import json
+import shlex
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,6 +19,10 @@ import yaml
 from commands import done, gsl, refused
 from test_import import ACTION, JOINTS, POSITION, TIME, csv, imported
 from test_lerobot import NAMES, degrees, edit, recorded, write_data_set
+
+from gsl.core.likeness import find_alike
+from gsl.core.override import spell, spell_key, spell_list, spell_setting
+from gsl.storage.importers.sizes import is_open_line
 
 pytestmark = pytest.mark.slow
 
@@ -87,6 +93,68 @@ def test_a_renamed_joint_is_refused_with_its_pair_and_the_setting_that_helps(tmp
     assert sorted(order) == [0, 1]
     np.testing.assert_allclose(batch.episodes[0].action, ACTION[:-1, order], atol=1e-9)
     assert imported(tmp_path, f"log.{end}", "mapping.joints=[shoulder]", "force=true").joints == ("shoulder",)
+
+
+def parse(typed: str) -> Any:
+    """Return what Hydra makes of a setting as a message proposes it to the shell."""
+    from hydra.core.override_parser.overrides_parser import OverridesParser
+    from hydra.core.override_parser.types import QuotedString
+
+    def plain_of(value: Any) -> Any:
+        if isinstance(value, dict):
+            return {key: plain_of(entry) for key, entry in value.items()}
+        if isinstance(value, list):
+            return list(map(plain_of, value))
+        return value.text if isinstance(value, QuotedString) else value
+
+    return plain_of(OverridesParser.create().parse_override(shlex.split(typed)[0]).value())
+
+
+STRANGE = [
+    "left knee",
+    "a,b",
+    "a]b",
+    "x: y",
+    "{j}",
+    'say "x"',
+    "it's",
+    "back\\slash",
+    "end\\",
+    "élan",
+    "1",
+    "true",
+    "-x",
+    "",
+]
+
+
+def test_settings_that_a_message_proposes_can_be_typed() -> None:
+    assert parse(spell_setting("mapping.joints", spell_list(STRANGE))) == STRANGE
+    keys = {spell_key(name): name for name in STRANGE if spell_key(name)}
+    assert list(keys.values()) == ["left knee", "a,b", "a]b", "x: y", "back\\slash", "end\\"]
+    pairs = ", ".join(f"{key}: {spell(name)}" for key, name in keys.items())
+    assert parse(spell_setting("k", f"{{{pairs}}}")) == {name: name for name in keys.values()}
+
+
+def test_a_renamed_joint_with_a_blank_is_proposed_in_quotes(tmp_path: Path) -> None:
+    columns = {name.replace("elbow", "left elbow").replace("shoulder", "a [1]"): v for name, v in plain().items()}
+    csv(tmp_path / "log.csv", {name.replace("action.left elbow", "action.left elbo"): v for name, v in columns.items()})
+    line = refused("import", "source=log.csv", folder=tmp_path)
+    pair, joints = line.partition("Pair all: ")[2].split(", or leave it out with ")
+    assert parse(pair.replace(", ...", "")) == {"column": {"left elbow": "action.left elbo"}}
+    assert parse(joints) == ["a [1]"]
+
+
+def test_names_without_end_are_compared_and_shown_in_part(tmp_path: Path) -> None:
+    long = "elbow" * 20_000
+    csv(tmp_path / "log.csv", {name.replace("elbow", f"{long}{name[:6]}"): v for name, v in plain().items()})
+    begin = time.process_time()
+    line = refused("import", "source=log.csv", folder=tmp_path)
+    assert time.process_time() - begin < 5.0 and len(line) < 600
+    assert line.endswith("? Rename it as its pair, or leave it out with mapping.joints=[shoulder]")
+    names = [f"{number}{'a' * 131_000}" for number in range(10_000)]
+    assert find_alike(names[7], names) == [names[7]]
+    assert time.process_time() - begin < 10.0
 
 
 ALONE = {
@@ -247,3 +315,15 @@ def test_a_whole_file_is_not_called_cut(tmp_path: Path) -> None:
     for end in ("", "\n"):
         (tmp_path / "log.csv").write_text("\n".join(text) + end)
         assert "ends within" not in refused("import", "source=log.csv", folder=tmp_path)
+
+
+@pytest.mark.parametrize("filling", [b"\n", b"\0"])
+def test_what_follows_a_line_is_not_unpacked(tmp_path: Path, filling: bytes) -> None:
+    path, packed = tmp_path / "log.csv.gz", gzip.compress(filling * 10_000_000)
+    path.write_bytes(gzip.compress(lines()) + packed * 1000)  # 10 GB
+    begin = time.process_time()
+    assert not is_open_line(path, 5)
+    assert not is_open_line(path, 303)
+    assert time.process_time() - begin < 2.0
+    path.write_bytes(gzip.compress(lines() + b"3.01,"))
+    assert is_open_line(path, 303) and not is_open_line(path, 302)

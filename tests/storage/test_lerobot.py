@@ -269,6 +269,8 @@ def test_what_is_typed_wrongly_gets_the_command_that_was_meant(tmp_path: Path) -
     assert line == "source = all: holds a LeRobot data set; say it: source=all/jump"
     line = refused("import", "source=wave", "mapping.files='*.parquet'", folder=tmp_path)
     assert line.endswith("wave is a LeRobot data set, which says where its files are; leave it out")
+    line = refused("import", "source=wave", "mapping=so101_arm", folder=tmp_path)
+    assert line.endswith("wave is a LeRobot data set, which says where its files are; leave mapping= out")
     line = refused("import", "source=wave", "mapping.joints=[shoulder_pam]", folder=tmp_path)
     assert "is no joint of the data set" in line and "shoulder_pan" in line
     line = refused("import", "source=wave", "mapping.calibration=arm.json", folder=tmp_path)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Iterator, Mapping, Sequence
 
-from gsl.errors import ConfigError, TrajectoryError
+from gsl.core.likeness import find_alike
+from gsl.core.override import spell, spell_key, spell_list, spell_setting
+from gsl.errors import SHOWN as LETTERS
+from gsl.errors import ConfigError, TrajectoryError, shorten
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.signal import PER_JOINT
 from gsl.storage.importers.table import Table
@@ -34,7 +36,7 @@ def joints_of(mapping: LogMapping, tables: Mapping[str, Table]) -> dict[str, str
         raise ConfigError("mapping.joints", "has no value; name them in order, or say {joint} in the positions' column")
     names = _list_joints("position", mapping, table)
     if not names:
-        there = ", ".join(table.names[:SHOWN]) or "none"
+        there = ", ".join(map(shorten, table.names[:SHOWN])) or "none"
         problem = f"is in no column; there is {there}; say in a mapping where things are (docs/howto/own-logs.md)"
         raise TrajectoryError(table.path, problem, column=str(form))
     for name, signal in mapping.signals.items():
@@ -64,24 +66,39 @@ def _check_pairs(
     signals = (mapping.signals["position"], mapping.signals[name])
     topics = [f"{signal.file} " * (signals[0].file != signals[1].file) for signal in signals]
     forms = [f"{topic}{signal.column}" for topic, signal in zip(topics, signals, strict=True)]
-    alone = [[name for name in own if name not in other] for own, other in (names, names[::-1])]
+    alone = [_list_apart(own, other) for own, other in (names, names[::-1])]
     for side in (1, 0):  # a command without a position first
         if not alone[side]:
             continue
         joint, choices = alone[side][0], alone[1 - side]
         cutoff = NEAR if len(alone[side]) == len(choices) == 1 else CLOSE
         problem = f"goes with {_fill(forms[1 - side], [joint])}, which is missing"
-        if near := difflib.get_close_matches(joint, choices, n=1, cutoff=cutoff):
-            position, command = (joint, near[0]) if side == 0 else (near[0], joint)
-            pairs = f"{position}: {_fill(signals[1].column, [command])}{', ...' * (len(names[0]) > 1)}"
-            mean = f"did you mean {_fill(forms[1 - side], near)}?"
-            problem += f"; {mean} Pair all: 'mapping.signals.{name}={{column: {{{pairs}}}}}'"
-        else:
-            problem += "; rename it as its pair"
-        if both := [name for name in names[0] if name in names[1]]:
-            chosen = f"{','.join(both[:SHOWN])}{',...' * (len(both) > SHOWN)}"
-            problem += f", or leave it out with mapping.joints=[{chosen}]"
+        pair = "; rename it as its pair"
+        for near in find_alike(joint, choices, cutoff=cutoff):
+            problem += f"; did you mean {_fill(forms[1 - side], [near])}?"
+            position, command = (joint, near) if side == 0 else (near, joint)
+            key, column = spell_key(position), str(signals[1].column).replace(JOINT, command)
+            pairs = f"{key}: {spell(column)}{', ...' * (len(names[0]) > 1)}"
+            pair = " Rename it as its pair"
+            if key and max(len(key), len(column)) <= LETTERS:
+                pair = f" Pair all: {spell_setting(f'mapping.signals.{name}', f'{{column: {{{pairs}}}}}')}"
+        problem += ", or ".join(filter(None, [pair, leave_out(_list_apart(names[0], alone[0]))]))
         raise TrajectoryError(tables[side].path, problem, column=_fill(forms[side], [joint]))
+
+
+def _list_apart(own: Sequence[str], other: Sequence[str]) -> list[str]:
+    """Return the names that the other side lacks, in order."""
+    there = set(other)
+    return [name for name in own if name not in there]
+
+
+def leave_out(joints: Sequence[str]) -> str:
+    """Return how to keep these joints alone; nothing if there are none, or one whose name nobody types."""
+    if not joints or max(map(len, joints)) > LETTERS:
+        return ""
+    chosen = spell_list(joints[:SHOWN])
+    chosen = f"{chosen[:-1]},...]" if len(joints) > SHOWN else chosen
+    return f"leave it out with {spell_setting('mapping.joints', chosen)}"
 
 
 def _list_joints(name: str, mapping: LogMapping, table: Table) -> list[str]:
@@ -114,4 +131,4 @@ def _joint(form: str, column: str) -> str:
 
 
 def _fill(form: object, joints: Sequence[str]) -> str:
-    return ", ".join(str(form).replace(JOINT, joint) for joint in joints[:SHOWN])
+    return ", ".join(shorten(str(form).replace(JOINT, joint)) for joint in joints[:SHOWN])

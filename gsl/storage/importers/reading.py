@@ -16,7 +16,7 @@ from gsl.storage.importers.labels import constant, find_label_columns
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
 from gsl.storage.importers.signal import AXES, BESIDE, BY_NAME, COMMANDS, FLAGS, Signal
-from gsl.storage.importers.sizes import OPEN_END, find_open_line
+from gsl.storage.importers.sizes import OPEN_END, is_open_line
 from gsl.storage.importers.stamps import order_rows, seconds
 from gsl.storage.importers.table import Table, missing_column
 from gsl.storage.trajectory_contract import UNITS
@@ -82,7 +82,7 @@ def _in_lines(error: TrajectoryError, tables: Iterable[Table]) -> TrajectoryErro
     line = error.line if first is None or error.row is None else error.row + first
     if line is None:
         return error
-    cut = f"; {OPEN_END}" if line == find_open_line(error.path) else ""
+    cut = f"; {OPEN_END}" if is_open_line(error.path, line) else ""
     return TrajectoryError(error.path, f"{error.problem}{cut}", column=error.column, line=line)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import gzip
 import io
+import math
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
@@ -63,17 +64,19 @@ def open_log(path: Path, *, most: float, lines: bool = False) -> Iterator[IO[byt
         raise TrajectoryError(path, f"cannot be read: {error.strerror or error}") from error
 
 
-def find_open_line(path: Path) -> int | None:
-    """Return the number of a text file's last line, from 1, if that does not end as lines do; else None.
+def is_open_line(path: Path, line: int) -> bool:
+    """Whether a text file ends within a line, counted from 1, as it does whose logger was killed.
 
-    A disk that lost its power pads with zeros.
+    A disk that lost its power pads with zeros. What follows that line is not read, nor more than `open_log` allows.
     """
     count, last = 1, b"\n"
-    with path.open("rb") as raw, contextlib.suppress(OSError, EOFError, zlib.error):
-        source = gzip.GzipFile(fileobj=raw) if path.name.endswith(".gz") else raw
-        while piece := source.read(PIECE):
-            count, last = count + piece.count(b"\n"), piece[-1:]
-    return None if last in b"\r\n" else count
+    try:
+        with open_log(path, most=math.inf, lines=True) as source:
+            while count <= line and (piece := source.read(PIECE)):
+                count, last = count + piece.count(b"\n"), piece[-1:]
+    except TrajectoryError:
+        return False
+    return count == line and last not in b"\r\n"
 
 
 class _Counted(io.RawIOBase):

@@ -43,7 +43,8 @@ def look_at(source: str, mapping: LogMapping, memory: float) -> Source:
     folder = Path(source)
     if is_data_set(folder):
         if mapping.files is not None:
-            problem = f"{source} is a LeRobot data set, which says where its files are; leave it out"
+            what = "it" if mapping.signals["position"].column == PLAIN else "mapping="
+            problem = f"{source} is a LeRobot data set, which says where its files are; leave {what} out"
             raise ConfigError("mapping.files", problem)
         data = open_data_set(folder, memory)
         notes: list[str] = []

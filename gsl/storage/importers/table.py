@@ -9,7 +9,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from gsl.core.budget import COLUMNS
-from gsl.errors import TrajectoryError
+from gsl.errors import TrajectoryError, shorten
 from gsl.storage.trajectory_contract import suggestion
 
 SHOWN = 12
@@ -43,7 +43,9 @@ def check_columns(path: Path, names: Sequence[str]) -> None:
 
 def missing_column(table: Table, name: str, others: Collection[str] = ()) -> TrajectoryError:
     """Return the error for a column that a table lacks; `others` are named already: they were not meant."""
-    shown = ", ".join(table.names[:SHOWN]) + (f" and {len(table.names) - SHOWN} more" * (len(table.names) > SHOWN))
+    shown = ", ".join(map(shorten, table.names[:SHOWN])) + (
+        f" and {len(table.names) - SHOWN} more" * (len(table.names) > SHOWN)
+    )
     near = suggestion(name, set(table.names) - set(others))
     return TrajectoryError(table.path, f"is missing{near or ''}; the file has {shown or 'no column'}", column=name)
 

@@ -37,11 +37,11 @@ class TextTable:
         with open_log(path, most=FACTOR * memory, lines=True) as file:
             first, second = _first_lines(path, file)
         self.separator = _separator(first)
-        cells = _cells(first.lstrip("#% "), self.separator)
+        cells = _cells(path, first.lstrip("#% "), self.separator)
         self.header = not all(_NUMBER.fullmatch(cell.lower()) for cell in cells)
         self.first_line: int | None = 1 + int(self.header)
         self.names: Sequence[str] = cells if self.header else [str(index) for index in range(len(cells))]
-        values = _cells(second if self.header else first, self.separator)
+        values = _cells(path, second if self.header else first, self.separator)
         self.decimal = "," if self.separator != "," and any(map(_DECIMAL_COMMA.fullmatch, values)) else "."
         check_columns(path, self.names)
         if (name := find_repeat(self.names)) is not None:
@@ -66,7 +66,7 @@ class TextTable:
 
         # without usecols, with which pandas takes rows of any length
         options = {"chunksize": max(1000, CELLS // len(self.names)), "decimal": self.decimal, "header": None}
-        options |= {"names": self.names, "skiprows": int(self.header), "index_col": False}
+        options |= {"names": self.names, "skiprows": int(self.header), "index_col": False, "low_memory": False}
         with open_log(self.path, most=FACTOR * self.memory, lines=True) as file, warnings.catch_warnings():
             warnings.simplefilter("error", pd.errors.ParserWarning)
             try:
@@ -105,10 +105,13 @@ def _separator(line: str) -> str:
     return best if counts[best] else BLANKS
 
 
-def _cells(line: str, separator: str) -> list[str]:
+def _cells(path: Path, line: str, separator: str) -> list[str]:
     if separator == BLANKS:
         return line.split()
-    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+    try:
+        return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True), [])]
+    except csv.Error as error:  # such as a cell of more than 131,072 letters
+        raise TrajectoryError(path, f"its first lines cannot be taken apart: {error}; export it again") from error
 
 
 def _values(path: Path, name: str, column: pd.Series, first: int) -> np.ndarray:

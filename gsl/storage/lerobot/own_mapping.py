@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from gsl.core.budget import TEXT_BYTES, parse_json, read_text
+from gsl.core.likeness import find_alike
 from gsl.core.validation import did_you_mean
-from gsl.errors import ConfigError, TrajectoryError
+from gsl.errors import ConfigError, TrajectoryError, shorten
+from gsl.storage.importers.joints import leave_out
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.signal import Signal, Time
 from gsl.storage.lerobot.arms import JAW_CLOSED, JAW_STROKE, OLD, OLD_ZEROS, OURS, bare, family, is_gripper, motor
@@ -72,7 +73,7 @@ def _entries(data: DataSet, mapping: LogMapping, arm: str | None) -> tuple[dict[
     there = [name for name in data.names[STATE] if name in data.names[ACTION]]
     there = [name for name in there if name.endswith(".pos")] or there
     if not there:
-        shown = [", ".join(data.names[key][:SHOWN]) for key in (STATE, ACTION)]
+        shown = [", ".join(map(shorten, data.names[key][:SHOWN])) for key in (STATE, ACTION)]
         problem = f"{STATE} has {shown[0]}, {ACTION} has {shown[1]}: none is in both; say where things are in a mapping"
         raise TrajectoryError(data.folder, problem)
     by_joint = {bare(name): name for name in there}
@@ -90,7 +91,9 @@ def _entries(data: DataSet, mapping: LogMapping, arm: str | None) -> tuple[dict[
             raise ConfigError(f"mapping.joints.{ours}", problem, given=str(theirs))
     chosen = {ours: by_joint[bare(str(theirs))] for ours, theirs in wanted.items()}
     left = [name for name in dict.fromkeys([*data.names[STATE], *data.names[ACTION]]) if name not in chosen.values()]
-    notes += [f"left out, as no joint's position: {', '.join(left[:SHOWN])}{' ...' * (len(left) > SHOWN)}"] * bool(left)
+    if left:
+        names = ", ".join(map(shorten, left[:SHOWN]))
+        notes.append(f"left out, as no joint's position: {names}{' ...' * (len(left) > SHOWN)}")
     return chosen, notes
 
 
@@ -100,7 +103,8 @@ def _check_pairs(data: DataSet, there: Sequence[str]) -> None:
     Raises:
         TrajectoryError: A command has no state, or a position, which `.pos` tells, no command.
     """
-    own = {key: [name for name in data.names[key] if name not in there] for key in (ACTION, STATE)}
+    both = set(there)
+    own = {key: [name for name in data.names[key] if name not in both] for key in (ACTION, STATE)}
     if any(name.endswith(".pos") for name in there):
         own = {key: [name for name in names if name.endswith(".pos")] for key, names in own.items()}
     elif not own[ACTION]:
@@ -109,12 +113,10 @@ def _check_pairs(data: DataSet, there: Sequence[str]) -> None:
         if own[key]:
             joint, choices = own[key][0], own[other]
             only = len(choices) == 1 == len(own[key])
-            near = choices[0] if only else next(iter(get_close_matches(joint, choices, n=1, cutoff=0.75)), "")
-            mean = f"; did you mean {other}.{near}? Name both alike in {INFO}" if near else ""
-            take = f"mapping.joints=[{','.join(bare(name) for name in there)}]"
-            problem = (
-                f"goes with {other}.{joint}, which is missing{mean}{', or' if near else ';'} leave it out with {take}"
-            )
+            near = choices[:1] if only else find_alike(joint, choices, cutoff=0.75)
+            ways = [f"did you mean {other}.{shorten(name)}? Name both alike in {INFO}" for name in near]
+            ways += filter(None, [leave_out([bare(name) for name in there])])
+            problem = f"goes with {other}.{shorten(joint)}, which is missing; {', or '.join(ways) or f'mend {INFO}'}"
             raise TrajectoryError(data.folder, problem, column=f"{key}.{joint}")
 
 
