@@ -15,8 +15,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import strangers
 from commands import ENVIRONMENT, done, gsl, refused
-from strangers import seal
 
 from gsl.core.budget import DEPTH, within
 from gsl.core.trust import check_code, code_in, modules_in
@@ -177,7 +177,7 @@ def test_an_effect_of_somebody_else_is_not_imported(place: Path) -> None:
 def test_a_run_of_somebody_else_is_repeated_with_their_code_only_if_it_is_trusted(artifact: Path, place: Path) -> None:
     path = artifact / "config.yaml"
     path.write_text(path.read_text().replace("gsl.stages.importing.Import", "evil.Thing"))
-    seal(artifact)
+    strangers.seal(artifact)
     said = gsl("rerun", "a", folder=place)
     assert said.code == 2 and "_target_ = evil.Thing: is code that is not gsl's; say trust=evil if" in said.err
 
