@@ -70,6 +70,13 @@ def test_another_motion_is_none() -> None:
     assert [repeat.motion for repeat in repeats] == [0, 1, 2, 3, 4, 5]
 
 
+def test_joints_that_go_against_each_other_wherever_they_are_aligned_are_no_repeat() -> None:
+    """As poses are that share no more than their range."""
+    up = record(lambda time: np.stack([0.3 * (time > 4.0), 0.3 * (time > 4.0)], axis=-1))
+    down = record(lambda time: 0.3 - np.stack([0.3 * (time > 4.0), 0.3 * (time > 4.0)], axis=-1), seed=1)
+    assert [repeat.motion for repeat in find_repeats([up, down], PERIOD)] == [0, 1]
+
+
 def test_a_part_of_a_motion_is_no_repeat_of_it() -> None:
     assert [r.motion for r in find_repeats([record(sines), record(sines, rows=250)], PERIOD)] == [0, 1]
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,6 +12,7 @@ import torch
 from commands import done, gsl, refused
 from toy_plant import QUICK, SLOW, a_batch, an_episode
 
+from gsl.core.console import Silent
 from gsl.core.history import History
 from gsl.errors import ConfigError
 from gsl.grounding.gat import ActionTransformation
@@ -30,7 +30,7 @@ from gsl.training.data import Parts
 from gsl.training.forward import fit_forward
 from gsl.validation.model_requirements import as_needed, looking_ahead
 
-QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
+QUIET = Silent()
 TICKS = 4
 
 

@@ -2,7 +2,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ import pytest
 from commands import done, gsl, refused
 from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
 
+from gsl.core.console import Silent
 from gsl.core.transitions import transitions
 from gsl.errors import ConfigError, TrajectoryError
 from gsl.grounding.gat import ActionTransformation, LoadedTransformation
@@ -25,7 +25,7 @@ from gsl.worlds.grounded import GroundedEnv
 
 pytestmark = pytest.mark.slow
 
-QUIET: Any = SimpleNamespace(status=lambda text: None, table=lambda title, columns, rows: None)
+QUIET = Silent()
 LINEAR = ModelConfig(family="linear", ridge=1e-6)
 
 

@@ -798,7 +798,7 @@ def test_help_is_of_the_world_that_is_typed(tmp_path: Path) -> None:
         ([-50.0, -51.0, -52.0], -45.5, "worth on the real side, and π0 is still significantly worth more in it"),
         ([-50.0, -51.0, -52.0], -56.5, "worth on the real side, and π0 is still significantly worth less in it"),
         ([-20.0, -21.0, -22.0], -50.5, "significantly farther"),
-        ([-50.0, -20.0, -30.0], -35.0, "held-out real episodes do not tell"),
+        ([-50.0, -20.0, -30.0], -35.0, "held-out real episodes do not show"),
         ([-50.0], -50.5, "is no measure"),
     ],
 )
@@ -812,5 +812,5 @@ def test_a_check_says_whether_a_grounding_is_nearer(real: list[float], grounded:
 def test_values_that_are_all_alike_are_not_taken_for_certain() -> None:
     seldom = np.repeat([1.0, 0.0], [5, 195])  # ten zeros are the rule there
     report = ValueReport(dict.fromkeys(("grounded", "ungrounded"), np.zeros(10)) | {"real": seldom}, {})
-    assert "200 held-out real episodes do not tell" in report.sentence
+    assert "200 held-out real episodes do not show" in report.sentence
     assert "still" not in report.sentence

@@ -91,7 +91,7 @@ def _align(first: np.ndarray, again: np.ndarray, most: int) -> int:
     alike = sum(correlate(b[:, k], a[:, k], method="fft") for k in range(a.shape[1]))
     lags = np.arange(1 - len(a), len(b))
     own = np.abs(lags) <= most
-    best = alike[own] >= (1.0 - ROUNDING) * alike[own].max()
+    best = alike[own] >= alike[own].max() - ROUNDING * np.abs(alike[own]).max()
     return int(min(lags[own][best], key=abs))
 
 
