@@ -154,15 +154,13 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
     for override in overrides:
         key, value = key_of(override), override.partition("=")[2]
         try:
-            parsed.append(override_read := parser.parse_overrides([override])[0])  # with the loader, which a glob asks
+            parsed.append(read := parser.parse_overrides([override])[0])  # with the loader, which a glob asks
         except HydraException as error:
             raise ConfigError(key, _unreadable(override, parser), given=value) from error
-        if override_read.is_sweep_override() and not multirun:
-            listed = f"; a list is written '{key}=[{value}]'" if override_read.is_choice_sweep() else ""
+        if read.is_sweep_override() and not multirun:
+            listed = f"; a list is written '{key}=[{value}]'" if read.is_choice_sweep() else ""
             raise ConfigError(key, f"several values need --multirun{listed}")
-        if _is_choice(override_read) and not (
-            override_read.is_sweep_override() or isinstance(override_read.value(), str | list | dict)
-        ):
+        if _is_choice(read) and not (read.is_sweep_override() or isinstance(read.value(), str | list | dict)):
             raise ConfigError(key.rpartition("@")[2], "takes the name of a file", given=value)
     return parsed
 
@@ -199,8 +197,8 @@ def _check_referred(command: str, composition: Composition) -> None:
     for key in typed:
         if f"${{{key}}}" not in text:
             last = key.rpartition(".")[2]
-            keys = [key for key in list_keys(composition.config) if not key.startswith(REFERRED)]
-            others = [key for key in keys if key.rpartition(".")[2] == last]
+            there = [name for name in list_keys(composition.config) if not name.startswith(REFERRED)]
+            others = [name for name in there if name.rpartition(".")[2] == last]
             hint = f"; did you mean {' or '.join(others[:3])}?" if others else ""
             raise ConfigError(key, f"nothing in gsl {command} refers to it here{hint}")
 

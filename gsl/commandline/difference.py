@@ -10,6 +10,7 @@ from gsl.errors import ArtifactError
 from gsl.report.account import plain
 from gsl.report.console import Console
 from gsl.report.diagnosis_two import set_side_by_side, table_of_two
+from gsl.report.diagnosis_verdict import verdict
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import REPORT, report_of
@@ -32,21 +33,21 @@ def compare(first: str, second: str, console: Console) -> None:
     Raises:
         ArtifactError: There is no such artifact, or it is damaged.
     """
-    left, other = (Artifact(folder, manifest.read(folder)) for folder in map(resolve_main, (first, second)))
-    for artifact in (left, other):
+    left, right = (Artifact(folder, manifest.read(folder)) for folder in map(resolve_main, (first, second)))
+    for artifact in (left, right):
         manifest.check_intact(artifact.folder, artifact.manifest)
-    made = left.manifest, other.manifest
+    made = left.manifest, right.manifest
     parents = [{parent.role: parent.hash[:SHORT] for parent in each.parents} for each in made]
     roles = parents[0].keys() & parents[1].keys()  # where such a parent lies is told by its contents
-    settings = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (left, other)]
+    settings = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (left, right)]
     software = [{**each.versions, "sources of gsl": each.sources[:SHORT], "kind": each.kind} for each in made]
     parts = {
         "settings": _differ(*settings),
         "made from": _differ(*parents),
         "software": _differ(*software),
-        "metrics": _differ(flat(left.metrics), flat(other.metrics)),
+        "metrics": _differ(flat(left.metrics), flat(right.metrics)),
     }
-    names = [name_run(each.folder) for each in (left, other)]
+    names = [name_run(each.folder) for each in (left, right)]
     for title, pairs in parts.items():
         if pairs:
             rows = [
@@ -54,9 +55,9 @@ def compare(first: str, second: str, console: Console) -> None:
             ]
             columns = [title, *names, *(["change"] if title == "metrics" else [])]
             console.table(f"{title}: {len(rows)} {'differ' if len(rows) > 1 else 'differs'}", columns, rows)
-    causes = _compare_diagnoses((left, other), (names[0], names[1]), console)
+    causes = _compare_diagnoses((left, right), (names[0], names[1]), console)
     same = not any(parts.values()) and all(row["alike"] for row in causes)
-    document = {**({"causes": causes} if causes else {}), "folders": [left.folder, other.folder], "same": same}
+    document = {**({"causes": causes} if causes else {}), "folders": [left.folder, right.folder], "same": same}
     text = f"{names[0]} and {names[1]}: the same settings, parents, software and metrics" if same else ""
     console.result({**document, **{title.replace(" ", "_"): pairs for title, pairs in parts.items()}}, text=text)
 
@@ -66,8 +67,9 @@ def _compare_diagnoses(artifacts: tuple[Artifact, Artifact], names: Pair, consol
     if any(artifact.manifest.kind != "diagnose" for artifact in artifacts):
         return []
     reports = _read_report(artifacts[0].folder), _read_report(artifacts[1].folder)
-    console.table(*table_of_two(*reports, names))
-    return set_side_by_side(*reports)
+    rows = set_side_by_side(*reports)
+    console.table(*table_of_two(rows, (verdict(reports[0]), verdict(reports[1])), names))
+    return rows
 
 
 def _read_report(folder: Path) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from gsl.errors import ArtifactError, ConfigError
 from gsl.report.console import Console
 from gsl.storage import manifest
 from gsl.storage.artifact import CONFIG, Artifact, build
-from gsl.storage.hashing import CIRCUMSTANCES, SHORT, file_hash
+from gsl.storage.hashing import CIRCUMSTANCES, SHORT
 from gsl.storage.references import resolve
 from gsl.worlds.external import ExternalRobot, asking
 
@@ -41,10 +41,7 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
         raise ConfigError(unknown[0], "is no setting of gsl rerun, which takes out= and trust=")
     folder = resolve(reference)
     old = Artifact(folder, manifest.read(folder))
-    if file_hash(folder / CONFIG) != old.manifest.files[CONFIG].sha256:
-        raise ArtifactError(
-            folder / CONFIG, "is not as the manifest says, so that it would be another run; copy it again"
-        )
+    manifest.check_intact(folder, old.manifest, only=(CONFIG,))  # other settings would be another run
     place = Path(words["out"]) if words.get("out") else _beside(folder)
     if place.exists():
         raise ArtifactError(place, "exists; take it away or choose another out=")

@@ -47,7 +47,7 @@ class Console(Protocol):
         """Say what is done now, of which nobody knows how long it takes."""
 
     @property
-    def is_planned(self) -> bool:
+    def has_plan(self) -> bool:
         """Whether it was said how long the work around takes, or nobody listens: a part of it says nothing then."""
 
     def plan(self, noun: str, parts: Sequence[Part]) -> AbstractContextManager[None]:
@@ -89,7 +89,7 @@ class Silent:
         """Say nothing."""
 
     @property
-    def is_planned(self) -> bool:
+    def has_plan(self) -> bool:
         """Nobody listens."""
         return True
 

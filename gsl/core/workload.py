@@ -134,7 +134,7 @@ class Workload:
         self._changed()
 
     @property
-    def is_planned(self) -> bool:
+    def has_plan(self) -> bool:
         """Whether somebody knows how long the present part takes."""
         return any(plan.seconds for plan in self._plans)
 

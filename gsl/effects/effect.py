@@ -110,7 +110,7 @@ def _library() -> tuple[str, ...]:
     return tuple(sorted(module.name for module in pkgutil.iter_modules(package.__path__) if module.name != "effect"))
 
 
-def effect_class(name: str) -> type:
+def effect_class(name: str) -> type[Any]:
     """Return the class of an effect of the library, or of a user's own.
 
     Raises:

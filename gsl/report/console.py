@@ -149,9 +149,9 @@ class Console:
         self._work.enter(visible(name))
 
     @property
-    def is_planned(self) -> bool:
+    def has_plan(self) -> bool:
         """Whether it was said how long the work around takes."""
-        return self._work.is_planned
+        return self._work.has_plan
 
     @contextmanager
     def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:

@@ -6,10 +6,10 @@ What two benches with the same servos share is likely of the servo; what differs
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
-from gsl.report.diagnosis_verdict import cause_name, verdict
+from gsl.report.diagnosis_verdict import cause_name
 from gsl.report.diagnosis_words import NONE, Document, entries, finite, interval, name, part, value
 from gsl.report.tables import Table
 
@@ -44,15 +44,22 @@ def set_side_by_side(first: Document, second: Document) -> list[dict[str, Any]]:
     ]
 
 
-def table_of_two(first: Document, second: Document, names: tuple[str, str]) -> Table:
-    """Return the causes of two diagnoses as a table."""
-    rows = [
+def table_of_two(rows: Sequence[Document], verdicts: tuple[str, str], names: tuple[str, str]) -> Table:
+    """Return the causes of two diagnoses as a table.
+
+    Args:
+        rows: From `set_side_by_side`.
+        verdicts: Of both.
+        names: Of both.
+    """
+    shown = [
         (row["cause"], name(row["parameter"]), row["sits"], _show(row["first"]), _show(row["second"]), _judge(row))
-        for row in set_side_by_side(first, second)[:ROWS]
+        for row in rows[:ROWS]
     ]
-    verdicts = ", ".join(f"{verdict(document)} in {run}" for document, run in zip((first, second), names, strict=True))
-    columns = ("cause", "parameter", "sits in", *names, "")
-    return Table(f"causes ({verdicts})", columns, rows, "Alike: the 95 % interval of the difference holds 0.")
+    title = ", ".join(f"{verdict} in {run}" for verdict, run in zip(verdicts, names, strict=True))
+    more = f"{len(rows) - ROWS} more are not shown. " if len(rows) > ROWS else ""
+    note = f"{more}Alike: the 95 % interval of the difference holds 0."
+    return Table(f"causes ({title})", ("cause", "parameter", "sits in", *names, ""), shown, note)
 
 
 def _list_parameters(document: Document) -> Iterator[tuple[tuple[str, str, str], Document]]:

@@ -32,7 +32,7 @@ def read_mark(path: Path) -> str:
     return first.removeprefix(MARK).strip() if first.startswith(MARK) else ""
 
 
-def check_marked(path: Path, request: str, *, by_hand: bool = False) -> None:
+def check_mark(path: Path, request: str, *, by_hand: bool = False) -> None:
     """Refuse a file, if there is one, that answers another request; one written `by_hand` need not say which.
 
     Raises:
@@ -58,7 +58,7 @@ def keep(path: Path, request: str, columns: Sequence[str], rows: Sequence[Sequen
     before = ""
     if path.exists():
         lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
-        check_marked(path, request)
+        check_mark(path, request)
         if lines[1].strip() != ",".join(columns):
             raise ArtifactError(path, "has other columns than the robot tells now; choose another --log")
         before = "".join(_without(lines, rows[0][0]))
@@ -124,7 +124,7 @@ def add_return(path: Path, request: str, episode: str, distance: str, *, fell: b
     Raises:
         ArtifactError: The file answers another request.
     """
-    check_marked(path, request, by_hand=True)
+    check_mark(path, request, by_hand=True)
     mark = not path.exists() or bool(read_mark(path))
     rows = read_returns(path)
     rows[episode] = {"episode": episode, "distance": distance, "fell": "yes" if fell else "no"}

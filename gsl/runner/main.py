@@ -90,8 +90,8 @@ class Sitting:
         self._request, self._asked = request, asked
         self._returns = asked.log.with_name(journal.RETURNS)
         check_writable(asked.log)
-        journal.check_marked(asked.log, request["hash"])
-        journal.check_marked(self._returns, request["hash"], by_hand=True)
+        journal.check_mark(asked.log, request["hash"])
+        journal.check_mark(self._returns, request["hash"], by_hand=True)
         names = [episode["name"] for episode in request["episodes"]]
         for name in asked.episode or ():
             if name not in names:

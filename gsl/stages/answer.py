@@ -21,7 +21,7 @@ from gsl.storage.answer_checks import check_answers
 from gsl.storage.answers import (
     STOPPED,
     check_lengths,
-    check_marked,
+    check_mark,
     check_rate,
     csv_episodes,
     read_log,
@@ -93,7 +93,7 @@ class Answer:
 def _csv(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...], list[Trajectory]]:
     """Return the names, if it is the runner's own, and the episodes of a file; a stop for safety is a fall."""
     if mark := read_mark(source):
-        check_marked(source, mark, request)
+        check_mark(source, mark, request)
     by_name = list(csv_episodes(source, request))
     names, episodes = tuple(name for name, _ in by_name) if mark else (), [episode for _, episode in by_name]
     return names, [
@@ -115,7 +115,7 @@ def _parquet(source: Path, request: Mapping[str, Any]) -> tuple[tuple[str, ...],
     batch = trajectories.read(source, joints=tuple(request["joints"]))
     names: tuple[str, ...] = ()
     if mark := str(batch.metadata.get("request", "")):
-        check_marked(source, mark, request)
+        check_mark(source, mark, request)
         names = tuple(str(label.get("name", "")) for label in batch.metadata.get("episodes", []))
     if missing := [joint for joint in request["joints"] if joint not in batch.joints]:
         raise TrajectoryError(source, f"the joint {missing[0]} was asked for, but is not in it")

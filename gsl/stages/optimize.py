@@ -123,7 +123,7 @@ class Optimize:
         """Yield the best candidate of each generation of a search."""
         search = optimizer.start(first, self.policy.scale, derive_seed(self.seed, self.kind))
         total = optimizer.generations * optimizer.candidates * self.rollouts
-        if log.read(0) is None and not console.is_planned and (line := estimate(scenario, first, total, self.workers)):
+        if log.read(0) is None and not console.has_plan and (line := estimate(scenario, first, total, self.workers)):
             console.status(line)
         error, highest = optimizer.race if isinstance(optimizer, Racing) else 0.0, -np.inf
         with console.progress(total, "optimising in simulation") as progress:

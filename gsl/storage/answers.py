@@ -84,11 +84,11 @@ def read_log(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     """Return the logged episodes of one file that says which request it answers."""
     if path.suffix == ".parquet":
         batch = trajectories.read(path, joints=tuple(request["joints"]))
-        check_marked(path, str(batch.metadata.get("request", "")), request)
+        check_mark(path, str(batch.metadata.get("request", "")), request)
         labels = [str(entry.get("name", "")) for entry in batch.metadata.get("episodes", [])]
         episodes = read_named(path, labels, batch.episodes, request)
     else:
-        check_marked(path, read_mark(path), request)
+        check_mark(path, read_mark(path), request)
         episodes = dict(csv_episodes(path, request))
     return {name: _read_log(path, name, episode, request) for name, episode in episodes.items()}
 
@@ -107,7 +107,7 @@ def read_named(
     return dict(zip(names, episodes, strict=True))
 
 
-def check_marked(path: Path, mark: str, request: Mapping[str, Any]) -> None:
+def check_mark(path: Path, mark: str, request: Mapping[str, Any]) -> None:
     """Refuse what answers another request, or does not say which."""
     if not mark:
         advice = f"gsl answer request={path.parent.as_posix()} logs=... takes in what something else has logged"
@@ -138,7 +138,7 @@ def csv_episodes(path: Path, request: Mapping[str, Any]) -> Iterator[tuple[str, 
 def read_returns(path: Path, request: Mapping[str, Any]) -> dict[str, Answered]:
     """Return what a person measured: rows of `episode`, `distance` [m] or `value`, and `fell` (yes or no)."""
     if mark := read_mark(path):
-        check_marked(path, mark, request)
+        check_mark(path, mark, request)
     answers: dict[str, Answered] = {}
     names, rows = table(path)
     if not {"episode", "fell"} <= set(names) or not {"distance", "value"} & set(names):

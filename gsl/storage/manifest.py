@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -102,12 +102,14 @@ def inventory(folder: Path) -> dict[str, File]:
     return {path.relative_to(folder).as_posix(): File(file_hash(path), path.stat().st_size) for path in paths}
 
 
-def find_damage(folder: Path, manifest: Manifest) -> str | None:
+def find_damage(folder: Path, manifest: Manifest, only: Container[str] | None = None) -> str | None:
     """Return the first file that is missing or not what the manifest says, None when the artifact's own are intact."""
     place, total = folder.resolve(), sum(file.bytes for file in manifest.files.values())
     if total > ARTIFACT_BYTES:
         raise ArtifactError(folder, f"says that it holds {total:,} bytes; {ARTIFACT_BYTES:,} are read")
     for name, file in manifest.files.items():
+        if only is not None and name not in only:
+            continue
         path = folder / name
         if not path.resolve().is_relative_to(place):
             raise ArtifactError(path, "leads out of the artifact; nothing of it is read")
@@ -121,13 +123,13 @@ def describe_damage(folder: Path, name: str) -> str:
     return "is not as the manifest says" if (folder / name).is_file() else "is missing"
 
 
-def check_intact(folder: Path, manifest: Manifest) -> None:
-    """Refuse an artifact of which a file is missing or was changed.
+def check_intact(folder: Path, manifest: Manifest, only: Container[str] | None = None) -> None:
+    """Refuse an artifact of which a file is missing or was changed; `only` these files, by default all.
 
     Raises:
         ArtifactError: It names the file.
     """
-    if damaged := find_damage(folder, manifest):
+    if damaged := find_damage(folder, manifest, only):
         raise ArtifactError(folder / damaged, f"{describe_damage(folder, damaged)}; {_DAMAGED}")
 
 

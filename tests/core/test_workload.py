@@ -58,14 +58,14 @@ def test_a_plan_within_a_part_is_that_part() -> None:
 
 def test_work_is_planned_where_somebody_around_knows_how_long_it_takes() -> None:
     load, _, _ = work()
-    assert not load.is_planned
+    assert not load.has_plan
     with load.plan("result", [Part()]):
-        assert not load.is_planned
+        assert not load.has_plan
         with load.plan("stage", [Part(1.0), Part()]):
-            assert load.is_planned
+            assert load.has_plan
             with load.plan("part", [Part()]):
-                assert load.is_planned
-        assert not load.is_planned
+                assert load.has_plan
+        assert not load.has_plan
 
 
 def test_the_time_left_is_that_of_the_plan_until_the_clock_knows_better() -> None:

@@ -38,14 +38,14 @@ def test_values_are_alike_where_the_interval_of_their_difference_holds_nothing()
 
 
 def test_the_table_says_what_is_of_one_alone() -> None:
-    table = table_of_two(FIRST, SECOND, ("a/diagnose", "b/diagnose"))
+    table = table_of_two(set_side_by_side(FIRST, SECOND), ("causes", "unknown"), ("a/diagnose", "b/diagnose"))
     assert table.title == "causes (causes in a/diagnose, unknown in b/diagnose)"
     assert [row[-1] for row in table.rows] == ["alike", "differs", "alike", "in one alone"]
     assert [row[3] for row in table.rows][-1] == "–"
 
 
 def test_nothing_is_no_row() -> None:
-    assert table_of_two({"verdict": "no_gap"}, {"verdict": "no_gap"}, ("a", "b")).rows == []
+    assert set_side_by_side({"verdict": "no_gap"}, {"verdict": "no_gap"}) == []
 
 
 UNSURE = cause("servo_gain", "servo", kp=(0.5, 0.02))
@@ -59,9 +59,10 @@ def test_a_value_of_which_too_little_is_known_is_neither_alike_nor_different(dam
     strange = {**UNSURE, "parameters": {"kp": {**UNSURE["parameters"]["kp"], **damage}}}
     other = {"verdict": "causes", "causes": [strange]}
     assert [row["alike"] for row in set_side_by_side(plain, other)] == [None]
-    assert [row[-1] for row in table_of_two(plain, other, ("a", "b")).rows] == ["–"]
+    assert [row[-1] for row in table_of_two(set_side_by_side(plain, other), ("causes",) * 2, ("a", "b")).rows] == ["–"]
 
 
 def test_a_table_has_an_end() -> None:
     many = [cause("coulomb_friction", "servo", **{f"p{k}": (0.1, 0.01)}) for k in range(200)]
-    assert len(table_of_two({"causes": many}, {"causes": many}, ("a", "b")).rows) == 50
+    table = table_of_two(set_side_by_side({"causes": many}, {"causes": many}), ("causes",) * 2, ("a", "b"))
+    assert len(table.rows) == 50 and str(table.caption).startswith("150 more are not shown.")

@@ -7,8 +7,8 @@ conditions the same commands are another motion.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.signal import correlate
@@ -37,45 +37,64 @@ def find_repeats(records: Sequence[Record], period: float, settings: RepeatSetti
         settings: What counts as the same.
     """
     how, repeats = settings or RepeatSettings(), list[Repeat]()
-    firsts: list[Record] = []
+    firsts: list[_Motion] = []
     seen: dict[tuple[bytes, str], Repeat] = {}
     for record in records:
         exact = (np.round(record.commands, DIGITS).tobytes(), repr(record.conditions))
         if (repeat := seen.get(exact)) is None:
-            repeat = _find(record, firsts, period, how) or Repeat(len(firsts))
+            motion = _Motion.of(record)
+            repeat = _find(motion, firsts, period, how) or Repeat(len(firsts))
             if repeat.motion == len(firsts):
-                firsts.append(record)
+                firsts.append(motion)
             seen[exact] = repeat
         repeats.append(repeat)
     return repeats
 
 
-def _find(record: Record, firsts: Sequence[Record], period: float, how: RepeatSettings) -> Repeat | None:
-    """Return the motion among the first records of motions that a record repeats, if it does."""
-    if record.base is not None:
-        return None  # on the ground what a robot does depends on where it stands
-    for motion, first in enumerate(firsts):
-        if first.conditions != record.conditions:
-            continue
-        if (later := _compare(first.commands, record.commands, period, how)) is not None:
-            return Repeat(motion, later)
+class _Motion(NamedTuple):
+    """What was commanded in a record, shape (T, width), under which conditions, its least and greatest, (width,)."""
+
+    commands: np.ndarray
+    conditions: Mapping[str, Any]
+    low: np.ndarray
+    high: np.ndarray
+    comparable: bool
+
+    @classmethod
+    def of(cls, record: Record) -> _Motion:
+        """Look at a record once; on the ground what a robot does depends on where it stands."""
+        low, high = record.commands.min(axis=0, initial=np.inf), record.commands.max(axis=0, initial=-np.inf)
+        comparable = record.base is None and bool(np.isfinite([low, high]).all())
+        return cls(record.commands, record.conditions, low, high, comparable)
+
+
+def _find(motion: _Motion, firsts: Sequence[_Motion], period: float, how: RepeatSettings) -> Repeat | None:
+    """Return which of the motions so far another record repeats, if it does."""
+    for number, first in enumerate(firsts):
+        if _may_repeat(first, motion, how):
+            later = _compare(first.commands, motion.commands, period, how)
+            if later is not None:
+                return Repeat(number, later)
     return None
+
+
+def _may_repeat(first: _Motion, again: _Motion, how: RepeatSettings) -> bool:
+    """Whether two motions are alike in conditions, length and range, without a look at when what comes."""
+    lengths = len(first.commands), len(again.commands)
+    if not (first.comparable and again.comparable) or first.conditions != again.conditions:
+        return False
+    if first.low.shape != again.low.shape or min(lengths) < max(FEW, how.share * max(lengths)):
+        return False
+    least = how.same + how.of_range * (first.high - first.low)
+    return bool((np.maximum(np.abs(first.low - again.low), np.abs(first.high - again.high)) <= least).all())
 
 
 def _compare(first: np.ndarray, again: np.ndarray, period: float, how: RepeatSettings) -> float | None:
     """Return by how many rows the same commands, shape (T, width), come later in another record; None for others."""
-    lengths = len(first), len(again)
-    if first.shape[1] != again.shape[1] or min(lengths) < max(FEW, how.share * max(lengths)):
-        return None
-    if not (np.isfinite(first).all() and np.isfinite(again).all()):
-        return None
-    extents = np.array([[part.min(axis=0), part.max(axis=0)] for part in (first, again)])
-    if (np.abs(extents[0] - extents[1]) > how.same + how.of_range * np.ptp(extents[0], axis=0)).any():
-        return None
     moving = np.ptp(first, axis=0) > how.clear * how.same
     later = _align(first[:, moving], again[:, moving], round(how.apart / period)) if moving.any() else 0
     before, after = _overlap(first, again, later)
-    if len(before) < how.share * max(lengths):
+    if len(before) < how.share * max(len(first), len(again)):
         return None
     padded = np.pad(before, ((1, 1), (0, 0)), mode="edge")
     near = np.array([padded[:-2], padded[1:-1], padded[2:]])  # a row late or early is the logger's

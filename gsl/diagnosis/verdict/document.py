@@ -124,7 +124,7 @@ def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
     sure = cause.probability >= findings.options.verdict.sure
     return {
         "effect": candidate.effect,
-        "kind": getattr(effect_class(candidate.effect), "kind"),  # noqa: B009  mypy
+        "kind": effect_class(candidate.effect).kind,
         "joints": _joints(findings.log.robot, candidate),
         "scope": candidate.scope,
         "fixed": {key: value for key, value in candidate.fixed.items() if key != "joints"},

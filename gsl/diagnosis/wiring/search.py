@@ -71,13 +71,13 @@ class Search:
     def run(self) -> Wiring:
         """Return all faults that stand."""
         search, stands, doubted = self, list[Stand](), None
-        first = fit = search._contest().fit()
-        lone = cut_motions(self.batch, self.plant).motions == 1
+        contest = self._contest()
+        first = fit = contest.fit()
         for _ in range(ROUNDS):
             stand = search._round(fit) or search._without_physics(fit)
             if stand is None:
                 break
-            if stand.fault.kind in LIKE_PHYSICS and (lone or search._is_small(stand.fault)):
+            if search._is_doubtful(stand.fault, lone=contest.log.motions == 1):
                 doubted = stand.fault
                 break
             stands.append(stand)
@@ -129,12 +129,12 @@ class Search:
         rows = round(middle)
         return rows if rows >= 1 and abs(middle - rows) < WHOLE and apart < AGREE else 0
 
-    def _is_small(self, fault: Fault) -> bool:
-        """Whether joints are so near, but for what one make differs by, that friction may do what other gains do."""
-        if fault.kind != "gains":
-            return False
-        gap = self._contest().fit(make=True).rms[list(fault.joints)]
-        return bool(np.sqrt((gap**2).mean()) < LARGE)
+    def _is_doubtful(self, fault: Fault, *, lone: bool) -> bool:
+        """Whether physics of a real servo may do what a fault does: in one motion, or where joints are near anyway."""
+        if fault.kind not in LIKE_PHYSICS or lone:
+            return fault.kind in LIKE_PHYSICS
+        gap = self._contest().fit(make=True).rms[list(fault.joints)]  # but for what robots of one make differ by
+        return fault.kind == "gains" and bool(np.sqrt((gap**2).mean()) < LARGE)
 
     def _is_physics(self, fault: Fault, after: Fit) -> bool:
         """Whether gains are such as the documented range of their effect holds."""

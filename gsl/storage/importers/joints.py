@@ -111,7 +111,7 @@ def _list_joints(name: str, mapping: LogMapping, table: Table) -> list[str]:
         for other, signal in mapping.signals.items()
         if other != name and signal.file == mapping.signals[name].file and _has_joint(signal.column)
     ]
-    closer = [form_of for form_of in others if len(form_of) > len(str(form))]
+    closer = [other for other in others if len(other) > len(str(form))]
     return [
         joint
         for column in table.names
