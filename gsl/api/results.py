@@ -17,6 +17,7 @@ from gsl.report.account import account
 from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import report_of
 from gsl.storage.hashing import PAGE
+from gsl.storage.manifest import check_files
 
 _FRAME = 'sandbox="allow-scripts" style="width: 100%; height: 600px; border: 0"'
 """A page may be a stranger's: its scripts do not reach the notebook around it, which can run code."""
@@ -93,6 +94,7 @@ class Verdict(Result):
         return f"{self.verdict}: {self.summary}"
 
     def _repr_html_(self) -> str:
+        check_files(self.folder, self.artifact.manifest, (PAGE,))
         page = read_text(self.folder / PAGE, DOCUMENT_BYTES)
         return f'<iframe srcdoc="{escape(page)}" {_FRAME}></iframe>'
 

@@ -27,7 +27,7 @@ from gsl.commandline.known_settings import list_keys, plain, read_declared, read
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
 from gsl.commandline.own_word import check_own_word, find_own_modules, find_trust
 from gsl.commandline.plugins import folders, packages
-from gsl.commandline.yaml_files import USER, BudgetedFiles, load_plugins
+from gsl.commandline.yaml_files import USER, BudgetedFiles, check_folder, load_plugins
 from gsl.core.budget import within
 from gsl.core.configuration import configuration_folder
 from gsl.core.setting import Setting
@@ -83,10 +83,10 @@ def open_hydra(config_dir: Path | None) -> Iterator[None]:
     """Open hydra on our configuration and, in front of it, the user's.
 
     Raises:
-        InputError: The user's folder does not exist.
+        InputError: The user's folder does not exist, or is an artifact whose yaml files are not as they were written.
     """
-    if config_dir is not None and not config_dir.is_dir():
-        raise InputError(f"--config-dir {config_dir}: there is no such folder")
+    if config_dir is not None:
+        check_folder(config_dir)
     OtherConfiguration.folder = config_dir.resolve() if config_dir is not None else None
     load_plugins().register(OtherConfiguration)
     with BudgetedFiles.in_place_of_hydras():

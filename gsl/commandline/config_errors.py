@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from hydra.errors import MissingConfigException
@@ -12,7 +13,7 @@ from omegaconf import DictConfig
 from omegaconf.errors import InterpolationToMissingValueError, MissingMandatoryValue
 
 from gsl.commandline.known_settings import list_keys
-from gsl.commandline.overrides import COMMAND_KEYS
+from gsl.commandline.overrides import COMMAND_KEYS, OPTIONAL_GROUPS
 from gsl.core.validation import NO_SUCH, did_you_mean
 from gsl.errors import ConfigError, InputError
 
@@ -55,8 +56,12 @@ def translate(error: Exception, words: Vocabulary) -> Exception:
     """Return what composition complains about as a `ConfigError`."""
     text, file = str(error), getattr(error, "missing_cfg_file", None) or ""
     if isinstance(error, MissingConfigException) and error.options is not None:
-        group, _, name = file.rpartition("/")
-        return InputError(f"no {group} called {name or '(nothing)'}{did_you_mean(name, error.options, listed=True)}")
+        groups = {*OPTIONAL_GROUPS, *(choice.partition("@")[0] for choice in words.chosen)}
+        group = next((group for group in groups if file.startswith(f"{group}/")), file.rpartition("/")[0])
+        name = file.removeprefix(f"{group}/")
+        is_path = "/" in name or (name.endswith((".yaml", ".yml")) and Path(name).stem not in error.options)
+        hint = _own_file(group, Path(name)) if is_path else did_you_mean(name, error.options, listed=True)
+        return InputError(f"no {group} called {name or '(nothing)'}{hint}")
     if key := unknown_key(error):
         return _no_such_setting(key, words)
     if isinstance(error, MissingConfigException):
@@ -76,6 +81,20 @@ def of_the_command(error: ConfigError, config: Mapping[str, Any]) -> ConfigError
     if above and error.problem.startswith(NO_SUCH) and name in {*COMMAND_KEYS, *config}:
         return ConfigError(error.setting, f"is a setting of the command, and not of {above}; type {name}=... yourself")
     return error
+
+
+def _own_file(group: str, place: Path) -> str:
+    """Return how a file of the user's own is taken that was named by its path, or by the folder around it."""
+    from gsl.storage.references import RUNS
+
+    inside = (sorted(folder.glob(f"{group}/*.yaml")) for folder in (place, RUNS / place))
+    if files := next(filter(None, inside), None):
+        folder, names = files[0].parents[1].as_posix(), [path.stem for path in files]
+    elif place.parent.name == group:
+        folder, names = place.parent.parent.as_posix(), [place.stem]
+    else:
+        folder, names = f"FOLDER, in which it is {group}/{place.stem}.yaml", [place.stem]
+    return f"; a file of your own is taken by its name: {' or '.join(names)}, with --config-dir {folder}"
 
 
 def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:

@@ -26,7 +26,7 @@ def verify(reference: str | None, console: Console) -> int:
     Raises:
         ArtifactError: There is no such artifact.
     """
-    wrong: dict[Path, str] = {}
+    wrong: dict[Path, Ancestor] = {}
     seen: Seen = {}
     folders = artifact_folders(reference)
     if not folders:
@@ -34,20 +34,27 @@ def verify(reference: str | None, console: Console) -> int:
     with console.progress(len(folders), "verifying artifacts") as progress:
         for folder in folders:
             for node in lineage(folder, seen).all():
-                if node.problem and node.place not in wrong:
-                    wrong[node.place] = node.problem
+                if node.problem:
+                    wrong.setdefault(node.place, node)
             progress.advance()
-    document = {"artifacts": len(folders), "problems": {place.as_posix(): why for place, why in wrong.items()}}
+    problems = {place.as_posix(): "; ".join(filter(None, [node.problem, node.remedy])) for place, node in wrong.items()}
+    document = {"artifacts": len(folders), "problems": problems}
     if not wrong:
         console.result(document, text=f"{len(folders)} of {len(folders)} artifacts are as they were made")
         return 0
     if console.json:
         console.result({**document, "exit_code": 1})
         return 1
-    (place, problem), *others = wrong.items()
-    for other, why in others:
-        console.status(f"{other.as_posix()}: {why}")
-    return console.error(f"{place.as_posix()}: {problem}", 1, command="gsl verify")
+    whole = all(node.absent for node in wrong.values())
+    first, *others = sorted(wrong.values(), key=lambda node: node.absent)
+    for other in others:
+        console.status(f"{other.place.as_posix()}: {other.problem}")
+    return console.error(_describe(first, "all that is here is whole" if whole else ""), 1, command="gsl verify")
+
+
+def _describe(wrong: Ancestor, besides: str = "") -> str:
+    """Return what is wrong and what to do."""
+    return "; ".join(filter(None, [f"{wrong.place.as_posix()}: {wrong.problem}", besides, wrong.remedy]))
 
 
 def draw_lineage(reference: str, console: Console) -> int:
@@ -61,7 +68,7 @@ def draw_lineage(reference: str, console: Console) -> int:
     wrong = [node for node in root.all() if node.problem]
     console.result(_document(root) | ({"exit_code": 1} if wrong else {}))
     if wrong and not console.json:
-        return console.error(f"{wrong[0].place.as_posix()}: {wrong[0].problem}", 1, command="gsl lineage")
+        return console.error(_describe(wrong[0]), 1, command="gsl lineage")
     return int(bool(wrong))
 
 

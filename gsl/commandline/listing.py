@@ -24,7 +24,16 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import out_of_date
-from gsl.storage.manifest import Manifest, Parent, describe_damage, find_damage, read, strange_file
+from gsl.storage.manifest import (
+    Manifest,
+    Parent,
+    check_files,
+    damage,
+    describe_damage,
+    find_damage,
+    read,
+    strange_files,
+)
 from gsl.storage.references import RUNS, find_all, find_damaged, resolve
 
 
@@ -94,25 +103,26 @@ def show_artifact(reference: str, console: Console) -> int:
         console.table("settings", ["setting", "value"], rows)
     files = [(name, size(file.bytes), file.sha256[:SHORT]) for name, file in artifact.manifest.files.items()]
     state = f"{damaged} {describe_damage(folder, damaged)}" if damaged else "all files are as they were made"
-    if strange := strange_file(folder, artifact.manifest):
+    if strange := next(strange_files(folder, artifact.manifest), None):
         state += f"; {strange} is no file of it"
     console.table("files", ["file", "size", "sha256"], files, state)
     if damaged is None:
         return 0
-    return console.error(f"{folder / damaged}: {describe_damage(folder, damaged)}", 1, command="gsl show")
+    return console.error(str(damage(folder, damaged)), 1, command="gsl show")
 
 
 def open_artifact(reference: str, console: Console) -> None:
     """Open the page of an artifact in a browser, and say where it is; a run of several stages may have one page above.
 
     Raises:
-        ArtifactError: There is no such artifact, or it has no page.
+        ArtifactError: There is no such artifact, it has no page, or that was changed since it was written.
     """
-    above = list((RUNS / reference).glob(f"*/{PAGE}"))
+    above = list((RUNS / reference).glob(f"[!.]*/{PAGE}"))
     folder = above[0].parent if len(above) == 1 else resolve(reference)
-    page = folder / PAGE
-    if not page.is_file():
-        raise ArtifactError(folder, f"has no page: {read(folder).kind} writes none; gsl show says what is in it")
+    page, stored = folder / PAGE, read(folder)
+    if not (page.is_file() or PAGE in stored.files):
+        raise ArtifactError(folder, f"has no page: {stored.kind} writes none; gsl show says what is in it")
+    check_files(folder, stored, (PAGE,))
     shown = has_display() and webbrowser.open(page.absolute().as_uri())
     console.result({"page": page, "opened": shown}, text=page.as_posix())
 
@@ -145,7 +155,7 @@ def _state(place: Path, expected: str) -> str:
         same = "the same" if content_hash(place) == expected else "built anew since"
         return f"{same}, but {stale}" if (stale := out_of_date(place)) else same
     except InputError:
-        return "gone or damaged"
+        return "damaged" if place.exists() else "not here"
 
 
 def _setting(name: str, value: Any) -> tuple[str, str]:

@@ -11,6 +11,7 @@ from gsl.core.described import restore
 from gsl.errors import ArtifactError
 from gsl.storage.artifact import CONFIG, Artifact
 from gsl.storage.identity import content_hash
+from gsl.storage.lineage import COPY, absence
 
 
 def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, Any]]:
@@ -21,12 +22,14 @@ def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, An
         trust: Modules that are not gsl's and whose classes its settings may name.
 
     Raises:
-        ArtifactError: A parent is no longer what the artifact was made from, or the settings name no stage.
+        ArtifactError: A parent is gone or no longer what the artifact was made from, or the settings name no stage.
         ConfigError: Its settings do not fit this version of gsl.
     """
     config = artifact.config
     for parent in artifact.manifest.parents:
         source = Path(os.path.relpath(artifact.folder / parent.path))
+        if not source.exists():
+            raise ArtifactError(source, f"{absence(artifact.folder)}; {COPY}")
         if content_hash(source) != parent.hash:
             raise ArtifactError(source, f"is no longer what {artifact.folder.as_posix()} was made from")
         _move(config, parent.role.split("."), source)

@@ -21,11 +21,13 @@ from gsl.commandline.overrides import FILE_GROUPS
 from gsl.core.budget import SETTINGS, read_text
 from gsl.core.trust import TARGET, TRUST
 from gsl.core.yaml_tree import yaml_tree
-from gsl.errors import InputError
+from gsl.errors import ArtifactError, InputError
+from gsl.storage.manifest import check_files, read, resembles, strange_files
 
 USER = "gsl-user"
 _HYDRA = "hydra"
 _SELF = "_self_"
+_OWN_FOLDER = "or copy what you have changed into a folder of your own, which holds no manifest.json"
 _SELECT = "oc.select"  # a setting, or a value where there is none
 
 
@@ -56,6 +58,20 @@ class BudgetedFiles(FileConfigSource):
             if config_path.partition("/")[0] in FILE_GROUPS and TARGET in _words(settings):
                 raise InputError(f"{path}: names a class, as {TARGET}, and a mapping builds none; leave it out")
         return super().load_config(config_path)
+
+
+def check_folder(config_dir: Path) -> None:
+    """Refuse a folder that is none, and an artifact in which somebody has changed or added settings."""
+    if not config_dir.is_dir():
+        raise InputError(f"--config-dir {config_dir}: there is no such folder")
+    if not resembles(config_dir):
+        return
+    try:
+        stored = read(config_dir)
+        files = [name for name in (*stored.files, *strange_files(config_dir, stored)) if name.endswith(".yaml")]
+        check_files(config_dir, stored, files)
+    except ArtifactError as error:
+        raise InputError(f"--config-dir {error}; {_OWN_FOLDER}") from error
 
 
 def check_file(path: Path, name: str) -> dict[str, Any]:

@@ -19,6 +19,8 @@ from gsl.diagnosis.design.next_experiment import write_next_experiment
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
 from gsl.diagnosis.log.gains import unseen_gains, with_logged_gains
+from gsl.diagnosis.log.log import label_indices
+from gsl.diagnosis.log.records import labels_of
 from gsl.diagnosis.options import Clocks, Duels, Most, Nulls, Options, PhaseReporter, Tolerance, Without
 from gsl.diagnosis.simulate.simulator import compare_with_bullet
 from gsl.diagnosis.verdict.document import document
@@ -86,6 +88,7 @@ class Diagnose:
         if sim is not self.sim:
             console.status("note: the simulator's servos get the gains of the log")
             return replace(self, sim=sim).run(folder, console)
+        label_indices(labels_of(log), self.held_out)  # refuses labels that there are not, before minutes of work
         wiring = audit_log(log, self.sim, self.real, console) if self.audit else None
         if wiring and wiring.spoils:
             return write_wiring(wiring, folder, real=self.real, sim=self.sim.robot, command=self._command())

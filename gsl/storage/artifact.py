@@ -87,9 +87,9 @@ class Artifact:
         try:
             stored = read(path)
         except (OSError, ValueError, InputError) as error:
-            raise ArtifactError(path, "is missing or damaged; build the artifact again with force=true") from error
+            raise ArtifactError(path, f"is missing or damaged; {manifest.REMEDY}") from error
         if not (isinstance(stored, dict) and all(isinstance(name, str) for name in stored)):
-            problem = "is damaged: it holds no mapping of names; build the artifact again with force=true"
+            problem = f"is damaged: it holds no mapping of names; {manifest.REMEDY}"
             raise ArtifactError(path, problem)
         return stored
 

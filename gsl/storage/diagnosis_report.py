@@ -42,6 +42,8 @@ def check_shape(report: Any) -> None:
     causes = [cause for key in ("causes", "suspects") for cause in _entries(report.get(key))]
     if not all(text is None or isinstance(text, str) for text in texts) or not all(map(_is_cause, causes)):
         raise ValueError("its causes or files are no such")
+    if not all(map(_is_names, _entries(report.get("inseparable")))):
+        raise ValueError("what it cannot tell apart are no names")
 
 
 def _entries(value: Any) -> list[Any]:
@@ -53,16 +55,19 @@ def _is_by_name(value: Any) -> bool:
     return isinstance(value, dict)
 
 
+def _is_names(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(name, str) for name in value)
+
+
 def _is_cause(cause: Any) -> bool:
     if not _is_by_name(cause):
         return False
     parameters, joints = cause.get("parameters") or {}, cause.get("joints") or []
-    names = [joints] if isinstance(joints, str) else joints
+    joints = [joints] if isinstance(joints, str) else joints
     return (
         _is_by_name(parameters)
         and all(map(_is_by_name, parameters.values()))
-        and isinstance(names, list)
-        and all(isinstance(name, str) for name in names)
+        and _is_names(joints)
         and isinstance(cause.get("scope") or "", str)
         and _is_by_name(cause.get("fixed") or {})
         and isinstance(cause.get("effect") or "", str)

@@ -14,6 +14,8 @@ from gsl.storage.manifest import Manifest, Parent
 
 LONGEST = 200
 """Generations of a lineage, of which an iteration adds less than ten."""
+COPY = "copy it to this place"
+REPEAT = "the same commands again bring what was made from it up to date"
 
 
 @dataclass(frozen=True)
@@ -25,14 +27,21 @@ class Ancestor:
         place: Where it lies, as seen from here.
         manifest: None for a plain file, and where there is none that can be read.
         problem: What is wrong with it itself, nothing if all is well.
+        remedy: What to do about that, where `problem` does not say it.
         parents: What it was made from; nothing where that stands elsewhere in the lineage.
     """
 
     role: str
     place: Path
     manifest: Manifest | None
-    problem: str
+    problem: str = ""
+    remedy: str = ""
     parents: list[Ancestor] = field(default_factory=list)
+
+    @property
+    def absent(self) -> bool:
+        """Whether there is nothing at its place; that is no damage."""
+        return self.remedy == COPY
 
     def all(self) -> Iterator[Ancestor]:
         """Yield everything above it, the first log first, and itself last."""
@@ -41,50 +50,63 @@ class Ancestor:
         yield self
 
 
-Seen = dict[Path, tuple[Manifest, str]]
+Problem = tuple[str, ...]
+"""What is wrong, and what to do about it; nothing if all is well."""
+
+Seen = dict[Path, tuple[Manifest, Problem]]
 """Artifacts that were looked at, by absolute path, and what is wrong with their files: each is hashed once."""
 
 
 def lineage(folder: Path, seen: Seen) -> Ancestor:
     """Return an artifact with all that is above it, every file hashed again; what is in `seen` is not followed."""
-    return _trace("", folder, None, seen, 0)
+    return _trace(None, folder, folder, seen, 0)
 
 
-def _trace(role: str, place: Path, expected: str | None, seen: Seen, depth: int) -> Ancestor:
-    again = seen.get(place.absolute())
+def _trace(of: Parent | None, place: Path, child: Path, seen: Seen, depth: int) -> Ancestor:
+    """Return what lies at a place as the parent `of` a child, None for what was asked for."""
+    again, role, expected = seen.get(place.absolute()), of.role if of else "", of.hash if of else None
     try:
+        if again is None and of and not place.exists():
+            return Ancestor(role, place, None, absence(child), COPY)
         if again is None and place.is_file():
-            return Ancestor(role, place, None, _file_problem(place, expected))
+            return Ancestor(role, place, None, *_judge(file_hash(place), expected, "was changed since"))
         stored, damage = again or _look_at(place)
     except (InputError, OSError) as error:
         return Ancestor(role, place, None, str(error).removeprefix(f"{place}: ").removeprefix(f"{place}/"))
-    problem = damage or ("was built anew since" if expected not in (None, stored.contents) else "")
+    problem = damage or _judge(stored.contents, expected, "was built anew since")
     if again is not None:
-        return Ancestor(role, place, stored, problem)
+        return Ancestor(role, place, stored, *problem)
     if depth == LONGEST:
         too_far = f"is {LONGEST} generations back; what it was made from is not looked at"
-        return Ancestor(role, place, stored, problem or too_far)
+        return Ancestor(role, place, stored, *(problem or (too_far,)))
     seen[place.absolute()] = stored, damage
     made = (*stored.parents, *stored.links)
-    above = [_trace(each.role, _place(place, each), each.hash, seen, depth + 1) for each in made]
-    return Ancestor(role, place, stored, problem, above)
+    above = [_trace(each, _place(place, each), place, seen, depth + 1) for each in made]
+    return Ancestor(role, place, stored, *problem, parents=above)
 
 
-def _look_at(folder: Path) -> tuple[Manifest, str]:
-    """Return the manifest of an artifact, and what is wrong with its files, nothing if all is well."""
+def _look_at(folder: Path) -> tuple[Manifest, Problem]:
+    """Return the manifest of an artifact, and what is wrong with its files."""
     stored = manifest.read(folder)
     if damaged := manifest.find_damage(folder, stored):
-        return stored, f"{damaged} {manifest.describe_damage(folder, damaged)}"
-    strange = manifest.strange_file(folder, stored)
-    return stored, f"{strange} is no file of the artifact" if strange else ""
+        return stored, (f"{damaged} {manifest.describe_damage(folder, damaged)}", manifest.REMEDY)
+    if strange := next(manifest.strange_files(folder, stored), None):
+        return stored, (f"{strange} {manifest.STRANGE}", manifest.TAKE_OUT)
+    return stored, ()
+
+
+def absence(child: Path) -> str:
+    """Return what is wrong with what `child` was made from and that is not there."""
+    return f"is not here, and {child.as_posix()} was made from it"
 
 
 def _place(folder: Path, parent: Parent) -> Path:
     return Path(os.path.relpath(folder / parent.path))
 
 
-def _file_problem(place: Path, expected: str | None) -> str:
-    return "was changed since" if expected not in (None, file_hash(place)) else ""
+def _judge(there: str, expected: str | None, problem: str) -> Problem:
+    """Return what is wrong where another hash is expected."""
+    return () if expected in (None, there) else (problem, REPEAT)
 
 
 def broken_link(folder: Path, stored: Manifest) -> str | None:

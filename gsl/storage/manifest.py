@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import os
-from collections.abc import Container, Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -22,7 +22,10 @@ HASH = "sha256"
 """Key of the hash of all other entries."""
 
 ALWAYS = frozenset({"config.yaml", "log.txt", "metrics.json"})  # files that no artifact lacks
-_DAMAGED = "build the artifact again with force=true"
+REMEDY = "copy the run again, or build it anew with force=true"
+"""What to do about an artifact that is not as it was made."""
+STRANGE, TAKE_OUT = "is no file of the artifact", "take it out of the folder"
+
 LONGEST = 1e12  # of a duration [s]
 _KINDS: Mapping[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("kind", "key", "command", "sources", "created", "metrics"), str),
@@ -130,19 +133,34 @@ def check_intact(folder: Path, manifest: Manifest, only: Container[str] | None =
         ArtifactError: It names the file.
     """
     if damaged := find_damage(folder, manifest, only):
-        raise ArtifactError(folder / damaged, f"{describe_damage(folder, damaged)}; {_DAMAGED}")
+        raise damage(folder, damaged)
 
 
-def strange_file(folder: Path, manifest: Manifest) -> str | None:
-    """Return the first file of the folder that the manifest does not name; hidden ones and other artifacts are none."""
+def damage(folder: Path, name: str) -> ArtifactError:
+    """Return the error for a damaged file of an artifact, which says what to do."""
+    return ArtifactError(folder / name, f"{describe_damage(folder, name)}; {REMEDY}")
+
+
+def check_files(folder: Path, manifest: Manifest, names: Collection[str]) -> None:
+    """Refuse these files of the folder if one is missing, was changed, or is none of the artifact.
+
+    Raises:
+        ArtifactError: It names the file.
+    """
+    if strange := sorted({*names} - manifest.files.keys()):
+        raise ArtifactError(folder / strange[0], f"{STRANGE}; {TAKE_OUT}")
+    check_intact(folder, manifest, only=names)
+
+
+def strange_files(folder: Path, manifest: Manifest) -> Iterator[str]:
+    """Yield the files of the folder that the manifest does not name; hidden ones and other artifacts are none."""
     for place, folders, files in os.walk(folder):
         here = Path(place)
         folders[:] = sorted(name for name in folders if name[0] != "." and not (here / name / NAME).is_file())
         for name in sorted(files):
             path = (here / name).relative_to(folder).as_posix()
             if name[0] != "." and path != NAME and path not in manifest.files:
-                return path
-    return None
+                yield path
 
 
 def write(folder: Path, manifest: Manifest) -> None:
@@ -173,18 +191,18 @@ def read(folder: Path) -> Manifest:
     except InputError as error:  # no plain file, or too large
         raise ArtifactError(folder / NAME, str(error).removeprefix(f"{folder / NAME}: ")) from error
     except (ValueError, RecursionError) as error:
-        raise ArtifactError(folder / NAME, f"is damaged: it is not JSON; {_DAMAGED}") from error
+        raise ArtifactError(folder / NAME, f"is damaged: it is not JSON; {REMEDY}") from error
     version = stored.get("schema_version") if isinstance(stored, dict) else None
     if version not in (SCHEMA_VERSION, WITHOUT_HASH):
         raise ArtifactError(folder / NAME, f"schema_version {version!r} is unknown; this gsl reads {SCHEMA_VERSION}")
     try:
         if version == SCHEMA_VERSION and stored.pop(HASH) != hash_entries(stored):
-            raise ArtifactError(folder / NAME, f"is damaged: it is not as it was written; {_DAMAGED}")
+            raise ArtifactError(folder / NAME, f"is damaged: it is not as it was written; {REMEDY}")
         parsed = _parse(stored)
     except (TypeError, AttributeError, KeyError, ValueError, RecursionError) as error:
-        raise ArtifactError(folder / NAME, f"is damaged: its entries do not fit; {_DAMAGED}") from error
+        raise ArtifactError(folder / NAME, f"is damaged: its entries do not fit; {REMEDY}") from error
     if missing := sorted({*ALWAYS, parsed.metrics} - parsed.files.keys()):
-        raise ArtifactError(folder / NAME, f"is damaged: it does not name {missing[0]}; {_DAMAGED}")
+        raise ArtifactError(folder / NAME, f"is damaged: it does not name {missing[0]}; {REMEDY}")
     return parsed
 
 

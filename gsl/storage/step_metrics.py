@@ -15,6 +15,7 @@ from typing import NamedTuple
 from gsl.core.budget import DOCUMENT_BYTES, read_text
 from gsl.errors import ArtifactError, InputError
 from gsl.storage.hashing import STEPS
+from gsl.storage.manifest import REMEDY
 
 
 class Step(NamedTuple):
@@ -73,7 +74,7 @@ def read_steps(folder: Path) -> list[Step]:
         lines = read_text(path, DOCUMENT_BYTES).splitlines()
         return [_parse(line) for line in lines]
     except (ValueError, TypeError, AttributeError, OverflowError, RecursionError, InputError) as error:
-        raise ArtifactError(path, "is damaged; build the artifact again with force=true") from error
+        raise ArtifactError(path, f"is damaged; {REMEDY}") from error
 
 
 def _read_whole(path: Path) -> Iterator[Step]:

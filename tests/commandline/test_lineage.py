@@ -12,6 +12,7 @@ from commands import done, gsl, refused
 from strangers import seal
 
 from gsl.commandline.rerun import AGAIN
+from gsl.storage.manifest import REMEDY
 
 pytestmark = pytest.mark.slow
 
@@ -43,7 +44,7 @@ DAMAGE: dict[str, tuple[Damage, str, str]] = {
     "the first log": (
         lambda runs: flip(runs / "collect_real/trajectories.parquet"), "collect_real", "trajectories.parquet is not as",
     ),
-    "a log that is gone": (lambda runs: shutil.rmtree(runs / "collect_sim"), "collect_sim", "does not exist"),
+    "a log that is gone": (lambda runs: shutil.rmtree(runs / "collect_sim"), "collect_sim", "is not here, and runs/chain/"),
     "a manifest": (
         lambda runs: flip(runs / "train_inverse/manifest.json"), "train_inverse: manifest.json", "is damaged",
     ),
@@ -91,7 +92,7 @@ def test_the_lineage_is_a_tree_down_to_the_logs(run: Path) -> None:
     assert [next(i for i, line in enumerate(lines) if f"runs/chain/{name} " in line) for name in order] == [*range(6)]
     shutil.rmtree(run / "runs/chain/collect_sim")
     said = gsl("lineage", "chain/evaluate", folder=run)
-    assert (said.code, "does not exist" in said.out, "does not exist" in said.lines[-1]) == (1, True, True)
+    assert (said.code, "is not here" in said.out, "is not here" in said.lines[-1]) == (1, True, True)
     tree = json.loads(gsl("lineage", "chain/optimize", "--json", folder=run).out)
     assert [parent["role"] for parent in tree["parents"]] == ["grounding.forward_model", "grounding.inverse_model"]
 
@@ -170,7 +171,7 @@ def test_verify_says_what_is_missing_and_needs_something_to_verify(run: Path, tm
     assert refused("verify", folder=mine).startswith("runs: holds no artifact, so nothing is verified")
     shutil.copytree(run / "runs/chain/collect_real", mine / "runs/mine/collect_real")
     for name, problem in (
-        ("trajectories.parquet", "trajectories.parquet is missing"),
+        ("trajectories.parquet", f"trajectories.parquet is missing; {REMEDY}"),
         ("manifest.json", "is no complete artifact: it holds no manifest.json"),
     ):
         (mine / "runs/mine/collect_real" / name).unlink()
@@ -185,7 +186,7 @@ def test_a_damaged_artifact_is_shown_and_ends_in_1(run: Path) -> None:
         (folder / name).write_bytes(b"\xff{")
         said = gsl("show", "chain/collect_real", folder=run)
         assert said.code == 1
-        assert said.lines == [f"gsl show: runs/chain/collect_real/{name}: is not as the manifest says"]
+        assert said.lines == [f"gsl show: runs/chain/collect_real/{name}: is not as the manifest says; {REMEDY}"]
         assert "gsl collect" in said.out
         assert json.loads(gsl("show", "chain/collect_real", "--json", folder=run).out)["exit_code"] == 1
         assert "chain/optimize" in done("runs", folder=run).out

@@ -34,6 +34,7 @@ def test_paths_of_a_report_are_good_from_where_the_command_runs(tmp_path: Path) 
         *({"causes": [{**CAUSE, **wrong}]} for wrong in ({"scope": 3}, {"fixed": [1]}, {"effect": ["x"]})),
         *({"next_experiment": wrong} for wrong in ([1], 3, "x", {"file": [1]})),
         *({"world_file": wrong} for wrong in ([1], 3)),
+        *({"inseparable": wrong} for wrong in (5, "ab", [1], ["a"], [["a", None]], {"a": 1})),
     ],
 )
 def test_a_report_of_another_shape_is_damaged(damage: dict[str, Any], tmp_path: Path) -> None:

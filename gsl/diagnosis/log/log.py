@@ -133,7 +133,7 @@ def cut_log(
     if walking and any(record.conditions for record in records):
         raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
     repeats = tuple(find_repeats(records, period, how.repeats))
-    asked = _label_indices(records, held_out or {})
+    asked = label_indices([record.about for record in records], held_out or {})
     parts = (how.walk_warm_up, how.walk_scored) if walking else (how.warm_up, how.scored)
     warm_up, scored = (round(part / period) for part in parts)
     pieces = cut_pieces(records, robot, period, warm_up=warm_up, scored=scored)
@@ -193,8 +193,12 @@ def _hold_out(
     return np.arange(len(pieces)) % 2 == 1, False
 
 
-def _label_indices(records: Sequence[Record], asked: Mapping[str, Any]) -> list[int]:
+def label_indices(records: Sequence[Mapping[str, Any]], asked: Mapping[str, Any]) -> list[int]:
     """Return the indices of the records that have some labels, each a value or several; none without labels.
+
+    Args:
+        records: What each is called and labelled.
+        asked: The labels.
 
     Raises:
         InputError: None of them has, or every one.
@@ -204,13 +208,13 @@ def _label_indices(records: Sequence[Record], asked: Mapping[str, Any]) -> list[
     wanted = {key: value if isinstance(value, list | tuple) else [value] for key, value in asked.items()}
     chosen = [
         k
-        for k, record in enumerate(records)
-        if all(any(alike(record.about.get(key), value) for value in some) for key, some in wanted.items())
+        for k, about in enumerate(records)
+        if all(any(alike(about.get(key), value) for value in some) for key, some in wanted.items())
     ]
     if 0 < len(chosen) < len(records):
         return chosen
     labels = ", ".join(f"{key}: {value}" for key, value in asked.items())
-    values = {key: sorted({str(record.about.get(key)) for record in records}) for key in asked}
+    values = {key: sorted({str(about.get(key)) for about in records}) for key in asked}
     there = "; ".join(f"{key} is {', '.join(some)}" for key, some in values.items())
     which = "every trajectory" if chosen else "no trajectory"
     raise InputError(f"held_out: {which} of the log has {{{labels}}}; there {there}")

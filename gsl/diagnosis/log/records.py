@@ -110,15 +110,19 @@ def to_records(batch: Batch, robot: Robot, *, walking: bool = False) -> tuple[Re
         robot: Whose motors follow.
         walking: Whether the base moves and is logged.
     """
-    labels = batch.metadata.get("episodes") or []
-    labels = labels if len(labels) == len(batch) else [{}] * len(batch)
     order = [batch.joints.index(joint) for joint in robot.controlled]
     varies = next(find_varying_gains([episode.sensors for episode in batch.episodes], batch.joints), None) is not None
     wide = has_other_commands(batch)
     return tuple(
         _to_record(label, episode, order, robot, batch.control_period, walking=walking, wide=wide, gains=varies)
-        for label, episode in zip(labels, batch.episodes, strict=True)
+        for label, episode in zip(labels_of(batch), batch.episodes, strict=True)
     )
+
+
+def labels_of(batch: Batch) -> Sequence[Mapping[str, Any]]:
+    """Return what a batch says about each of its trajectories."""
+    labels = batch.metadata.get("episodes") or []
+    return labels if len(labels) == len(batch) else [{}] * len(batch)
 
 
 def _to_record(
