@@ -9,7 +9,7 @@ import re
 from collections import Counter
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from functools import cached_property
 from typing import Annotated, Any
 
@@ -166,12 +166,7 @@ def _fits_name(name: str, pattern: str) -> bool:
 
 
 def _fits_age(run: Run, now: datetime, least: float | None, most: float | None) -> bool:
-    try:
-        made = datetime.fromisoformat(run.artifact.manifest.created)
-    except ValueError:
-        return least is None and most is None
-    made = made if made.tzinfo else made.replace(tzinfo=UTC)
-    age = (now - made).total_seconds()
+    age = (now - datetime.fromisoformat(run.artifact.manifest.created)).total_seconds()
     return (least is None or age >= least) and (most is None or age <= most)
 
 

@@ -169,10 +169,7 @@ def _setting(name: str, value: Any) -> tuple[str, str]:
 
 def _local(created: str) -> str:
     """Return a moment in coordinated universal time as one of this place."""
-    try:
-        return datetime.fromisoformat(created).astimezone().strftime("%Y-%m-%d %H:%M:%S")
-    except ValueError:
-        return created
+    return datetime.fromisoformat(created).astimezone().strftime("%Y-%m-%d %H:%M:%S")
 
 
 def _span(manifest: Manifest) -> str:

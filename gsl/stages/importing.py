@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
+import numpy as np
+
 from gsl.core.console import Console
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
@@ -50,6 +52,7 @@ class Import:
         alone = len(files) == 1
         return {"source" if alone else f"source {name}": file for name, file in files.items()}
 
+    @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # of absurd values, which are refused in words
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write one parquet file, and what was found as a document."""
         chosen = look_at(self._source(), self.mapping, self.memory * GB)
@@ -75,6 +78,7 @@ class Import:
             "seconds": sum(float(episode.trajectory.time[-1]) for episode in imported),
         }
 
+    @np.errstate(over="ignore", divide="ignore", invalid="ignore")  # of absurd values, which are refused in words
     def look(self, console: Console) -> dict[str, Any]:
         """Say what `run` would do, and return it with the exit code that it would have."""
         chosen = look_at(self._source(), self.mapping, self.memory * GB)

@@ -7,10 +7,12 @@ import hashlib
 import os
 from collections.abc import Collection, Container, Iterator, Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from gsl.core.budget import ARTIFACT_BYTES, MANIFEST_BYTES, read_json
+from gsl.core.unit import Unit
 from gsl.errors import ArtifactError, InputError
 from gsl.storage import documents
 from gsl.storage.hashing import contents_hash, file_hash
@@ -27,6 +29,8 @@ REMEDY = "copy the run again, or build it anew with force=true"
 STRANGE, TAKE_OUT = "is no file of the artifact", "take it out of the folder"
 
 LONGEST = 1e12  # of a duration [s]
+PATH = 4096  # bytes of a path: linux/limits.h
+FIRST, LAST = 1970, 9998  # years: a moment of another one may be none in another time zone
 _KINDS: Mapping[str, type | tuple[type, ...]] = {
     **dict.fromkeys(("kind", "key", "command", "sources", "created", "metrics"), str),
     **dict.fromkeys(("seeds", "versions"), dict),
@@ -221,8 +225,14 @@ def _parse(stored: dict[str, Any]) -> Manifest:
             raise ValueError(f"{name} is of another kind")
     texts = [text for reference in (*parents, *links) for text in (reference.role, reference.path, reference.hash)]
     texts += [*trust, *(file.sha256 for file in files.values())]
-    if not all(isinstance(text, str) and "\0" not in text for text in texts):
-        raise ValueError("a part of it is no text")
+    if not all(isinstance(text, str) and "\0" not in text and len(text) <= PATH for text in texts):
+        raise ValueError("a part of it is no text, or longer than any path")
+    unit = Unit(**(stored.get("unit") or {}))
+    if not (isinstance(unit.factor, int | float) and isinstance(unit.name, str)):
+        raise ValueError("its unit is none")
+    made = datetime.fromisoformat(stored["created"])
+    if made.tzinfo is None or not FIRST <= made.year <= LAST:
+        raise ValueError("it was made at no moment")
     if not abs(stored["duration"]) < LONGEST:
         raise ValueError("its duration is none")
     for name in (*files, stored.get("metrics", Manifest.metrics)):

@@ -44,7 +44,7 @@ DAMAGE: dict[str, tuple[Damage, str, str]] = {
     "the first log": (
         lambda runs: flip(runs / "collect_real/trajectories.parquet"), "collect_real", "trajectories.parquet is not as",
     ),
-    "a log that is gone": (lambda runs: shutil.rmtree(runs / "collect_sim"), "collect_sim", "is not here, and runs/chain/"),
+    "a log that is gone": (lambda runs: shutil.rmtree(runs / "collect_sim"), "collect_sim", "is not here, and runs"),
     "a manifest": (
         lambda runs: flip(runs / "train_inverse/manifest.json"), "train_inverse: manifest.json", "is damaged",
     ),

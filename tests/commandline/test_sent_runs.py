@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import json
 import shutil
+import zipfile
 from pathlib import Path
+from typing import Any
 
 import pytest
 from commands import done, gsl, refused
@@ -143,3 +145,48 @@ def test_a_world_that_is_named_by_its_file_is_told_how(
     (tmp_path / "my_conf/world/mine.yaml").write_text("defaults: [nao_ideal, _self_]\n")
     line = refused("iterate", f"{role}={typed}", "--cfg", "job", folder=tmp_path)
     assert line.startswith(f"no world called {typed}; ") and said in line
+
+
+ENTRIES = {
+    "a moment that is none here": {"created": "0001-01-01T00:00:00+23:59"},
+    "a moment that is none there": {"created": "9999-12-31T23:59:59-23:59"},
+    "no time zone": {"created": "2026-01-01T00:00:00"},
+    "no moment": {"created": "yesterday"},
+    "another unit": {"unit": {"scale": 1.0}},
+    "a unit of another kind": {"unit": {"factor": "x"}},
+    "a path without end": {"parents": [{"role": "source", "path": "x/" * 60_000, "hash": ""}]},
+}
+
+
+@pytest.mark.parametrize("entries", ENTRIES.values(), ids=ENTRIES)
+def test_a_manifest_of_impossible_entries_is_damaged(entries: dict[str, Any], run: Path, tmp_path: Path) -> None:
+    seal(run, **entries)
+    line = f"runs/a/import/manifest.json: is damaged: its entries do not fit; {AGAIN}"
+    assert refused("show", "a/import", folder=tmp_path) == line
+    assert done("runs", folder=tmp_path).lines == ["runs/a/import: its manifest cannot be read; gsl verify says why"]
+
+
+def test_a_lock_of_a_stranger_leads_nowhere(run: Path, tmp_path: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    (run.parent / ".import.lock").symlink_to(elsewhere)
+    done("import", "source=log.csv", "mapping=plain", "name=a", "force=true", folder=tmp_path)
+    assert not elsewhere.exists()
+    assert not (run.parent / ".import.lock").is_symlink()
+
+
+@pytest.mark.parametrize("shape", ["(0, 99999999999999999999)", "(True,)", "(-1,)"])
+def test_an_array_of_an_impossible_shape_is_refused(shape: str, tmp_path: Path) -> None:
+    header = f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}}}\n".encode()
+    with zipfile.ZipFile(tmp_path / "log.npz", "w") as archive:
+        archive.writestr("time.npy", b"\x93NUMPY\x01\x00" + len(header).to_bytes(2, "little") + header + bytes(8))
+    line = refused("import", "source=log.npz", "mapping=plain", folder=tmp_path)
+    assert line == "log.npz, column time.npy: is no numpy array; save it with numpy.savez"
+
+
+@pytest.mark.parametrize("row", ["{0:.2f},1e308,-1e308", "{0}e300,0.1,{0}", "{0}e-320,0.1,{0}"])
+def test_absurd_numbers_are_told_in_words_alone(row: str, tmp_path: Path, recwarn: pytest.WarningsRecorder) -> None:
+    rows = "\n".join(row.format(k / 100) for k in range(60))
+    (tmp_path / "log.csv").write_text(f"time,action.a,position.a\n{rows}\n")
+    said = gsl("import", "source=log.csv", "mapping=plain", "check=true", folder=tmp_path)
+    assert (said.code, said.err, "would be refused (1)" in said.out) == (2, "", True)
+    assert not recwarn.list

@@ -19,6 +19,7 @@ from gsl.storage.importers.array_table import Shapes
 from gsl.storage.importers.sizes import DAMAGED
 
 END = ".npy"
+MOST = 2**40  # of a dimension: an array of nothing may be as long as it says, and no memory holds it
 _DAMAGED = (OSError, EOFError, zipfile.BadZipFile, zlib.error, struct.error)
 _NO_HEADER = (ValueError, SyntaxError, TypeError, EOFError, zlib.error, MemoryError, RecursionError)
 
@@ -116,4 +117,6 @@ def _read_header(file: BinaryIO) -> tuple[tuple[int, ...], np.dtype[Any]]:
     rest = io.BytesIO(size + file.read(int.from_bytes(size, "little")))
     read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
     shape, _, kind = read(rest)
+    if not all(type(length) is int and 0 <= length <= MOST for length in shape):
+        raise ValueError(f"no array has the shape {shape}")
     return shape, kind
