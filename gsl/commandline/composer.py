@@ -247,7 +247,8 @@ def _first_value(override: Override) -> str:
 
 def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
     """Compose, or take what the same words came to in this process, unless a file has changed; nobody may change it."""
-    if OtherConfiguration.folder is not None:  # who knows how much lies in there
+    elsewhere = any("../" in override for override in overrides)  # as a mapping that is named by its path
+    if OtherConfiguration.folder is not None or elsewhere:  # who knows how much lies in there
         return _compose_anew(command, overrides, trust)
     files = (path for folder in (configuration_folder(), *folders()) for path in folder.rglob("*.yaml"))
     stamps = frozenset((path, (status := path.stat()).st_mtime_ns, status.st_size) for path in files if path.exists())

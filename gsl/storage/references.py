@@ -23,6 +23,7 @@ MAKERS = {
 }
 """Commands that make an artifact of a run, by the name that it has there."""
 ALIKE = 0.8  # evaluat is evaluate; evaluate_none is not
+CHOICES = 20  # of artifacts in a message
 ALTERNATIVES = 3  # of the same name further down in a run: those of its first iterations
 
 
@@ -52,7 +53,8 @@ def resolve(reference: str | Path, *, kind: str | tuple[str, ...] | None = None,
     if len(fitting) == 1:
         return fitting[0].folder
     if fitting:
-        choices = ", ".join(name_run(artifact.folder, runs) for artifact in fitting)
+        choices = ", ".join(name_run(artifact.folder, runs) for artifact in fitting[:CHOICES])
+        choices += f" and {len(fitting) - CHOICES} more" if len(fitting) > CHOICES else ""
         raise ArtifactError(reference, f"several artifacts fit, name one of them: {choices}")
     if own:
         raise ArtifactError(place, f"holds {own[0].manifest.kind}, but {wanted} is needed")

@@ -47,6 +47,8 @@ SENSORS = (
 
 
 MOST_EPISODES = 100_000
+SHORTEST = 1e-6
+"""Period of a log [s]; no robot is read a million times a second, and the rate of a shorter one may be no number."""
 LARGEST = 1e12  # of any number in a column, in SI units: squares and sums of such numbers are still numbers
 SHOWN = 40  # characters of a value in an error
 MOST_PERIOD = 1e6  # of a control period [s], days
@@ -116,6 +118,8 @@ def check_metadata(path: Path, metadata: Any, robot_joints: tuple[str, ...] | No
     period = metadata["control_period"]
     if not (_is_number(period, MOST_PERIOD) and period > 0):
         raise TrajectoryError(path, f"control_period {_short(period)} must be a positive number of seconds")
+    if period < SHORTEST:
+        raise TrajectoryError(path, f"control_period {_short(period)} must be at least {SHORTEST:g} s")
     states = metadata.get("states", 0)
     if not _is_count(states):
         raise TrajectoryError(path, f"states {_short(states)} must be the number of entries of the state")

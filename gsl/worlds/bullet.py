@@ -32,6 +32,7 @@ from gsl.worlds.torque_noise import TorqueNoise
 from gsl.worlds.velocity_motors import Motors, check_motors
 
 OWN = "effects of a user's own"  # among what is pickled
+FINEST = 1e-5  # physics period [s]: finer ones change nothing but the time that a walk takes, without end
 FALLEN_TILT = 0.5  # cosine of the tilt beyond which the robot has fallen
 
 
@@ -45,7 +46,7 @@ class BulletWorld:
     ]
     effects: Annotated[Mapping[str, Any], setting("what this world adds to the nominal robot, by name")]
     floating: Annotated[bool, setting("base on the ground (true) or held in the air (false)")] = True
-    step: Annotated[float, setting("physics period", unit="s", gt=0, le=0.02)] = 0.002
+    step: Annotated[float, setting("physics period", unit="s", ge=FINEST, le=0.02)] = 0.002
     iterations: Annotated[int, setting("iterations of the constraint solver", ge=1)] = 50
     period: Annotated[float, setting("control period", unit="s", gt=0, le=0.1)] = 0.02
     start_noise: Annotated[float, setting("standard deviation of the joints at the start", unit="rad", ge=0)] = 0.03

@@ -42,6 +42,7 @@ ARM = "experiment=arm preset=toy grounding=gat"
         ("collect task.duration=-1", "task.duration = -1: must be above 0 (s)"),
         ("collect task.duration=0.001", "task.duration = 0.001: must be at least one control period (0.02 s)"),
         ("collect world.step=0.003", "world.period: 0.02 s is not a multiple of the physics step 0.003 s"),
+        ("collect world.step=1e-12", "world.step = 1e-12: must be at least 1e-05 (s)"),
         ("collect world.robot=pepper", "world.robot: no robot called 'pepper'; there is go2, nao, pendulum"),
         ("collect workers=0", "workers = 0: must not be 0; -1 is one process a core"),
         ("collect workers=1000000", "workers = 1000000: must be at most 1024"),

@@ -190,3 +190,11 @@ def test_absurd_numbers_are_told_in_words_alone(row: str, tmp_path: Path, recwar
     said = gsl("import", "source=log.csv", "mapping=plain", "check=true", folder=tmp_path)
     assert (said.code, said.err, "would be refused (1)" in said.out) == (2, "", True)
     assert not recwarn.list
+
+
+def test_a_mapping_that_was_changed_counts_in_the_same_process(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text(LOG)
+    words = ("import", "source=log.csv", "mapping=mine.yaml", "--cfg", "job", "--json")
+    for period in (0.01, 0.02):
+        (tmp_path / "mine.yaml").write_text(f"defaults: [plain, _self_]\nperiod: {period}\n")
+        assert json.loads(done(*words, folder=tmp_path).out)["mapping"]["period"] == period

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -120,3 +121,10 @@ def test_every_complete_artifact_is_listed_and_nothing_else(runs: Path) -> None:
         "study/iteration_02/optimize",
     ]
     assert find_all(Path("nowhere")) == []
+
+
+def test_a_choice_among_very_many_has_an_end(runs: Path) -> None:
+    for k in range(23):
+        shutil.copytree(runs / "quick-start/collect", runs / f"many/r{k:02d}/collect")
+    with pytest.raises(ArtifactError, match=r"name one of them: many/r00/collect, .*, many/r19/collect and 3 more$"):
+        resolve("many")

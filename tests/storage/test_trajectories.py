@@ -200,7 +200,7 @@ def test_a_file_that_breaks_the_contract_is_refused_in_one_line(
 
 STRANGE = {
     "episodes": [5, "x", [1], [{"policy": []}], [{"conditions": [1]}]],
-    "control_period": [int("9" * 290), 1e300, "x", [], True],
+    "control_period": [int("9" * 290), 1e300, 1e-320, "x", [], True],
     "states": [10**9, -1, 1.5], "action_noise": ["x", []], "cells": ["x", 10**6], "robot": [{}, 5],
     "pi0_falls": [2.0, {}],
 }  # fmt: skip

@@ -13,9 +13,9 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
 from gsl.effects.effect import build
 from gsl.errors import ConfigError
-from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, SHORTEST, Signal, Time
+from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, Signal, Time
 from gsl.storage.importers.units import factor
-from gsl.storage.trajectory_contract import INTEGERS, UNITS, suggestion
+from gsl.storage.trajectory_contract import INTEGERS, SHORTEST, UNITS, suggestion
 
 T = TypeVar("T")
 TAKEN = (*INTEGERS, "time", "reward", "fell", "terminated", "state", "next_state")

@@ -11,12 +11,11 @@ from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.storage.importers.units import factor
+from gsl.storage.trajectory_contract import SHORTEST
 
 Columns = str | int | list[str | int] | dict[str, str | int]
 Values = float | dict[str, float]
 
-SHORTEST = 1e-6
-"""Period of a log [s]; no robot is read a million times a second, and the rate of a shorter one may be no number."""
 BESIDE = (*OTHER_COMMANDS, "kp_command", "kd_command")  # of a servo that takes more than a position
 PER_JOINT = ("action", "grounded_action", "position", "velocity", "torque", "temperature", *BESIDE)
 COMMANDS = ("action", "grounded_action")
