@@ -26,6 +26,7 @@ from gsl.diagnosis.verdict.verdict import Verdict
 from gsl.effects.effect import effect_class, together
 from gsl.storage.diagnosis_report import DIGITS
 
+MEANING = 0.03  # spread of a value between two codes of one effect, share of its way from doing nothing. Estimate
 TIMING = HALF_STEP / math.sqrt(3.0)  # spread of lags between simulators that are up to half a step apart [s]
 
 
@@ -95,16 +96,17 @@ class Findings:
     def scatter(self) -> np.ndarray:
         """What the chosen hypothesis' parameters are off by beside noise, shape (n_parameters,).
 
-        That is their root mean square error in the self-test. Times have the difference of two simulators beside it,
-        where the log is not of one of gsl's.
+        That is their root mean square error in the self-test and, where the log is not of one of gsl's own simulators,
+        what two simulators differ by that mean the same.
         """
         chosen = self.selection.chosen
         errors = [trial.errors for trial in self.trials if trial.truth == chosen.names]
         scatter = np.sqrt(np.mean(np.square(errors), axis=0)) if errors else np.zeros(len(chosen.start))
-        if self.log.made_at is not None:
+        if self.log.made_at is not None or not chosen.size:
             return scatter
         units = [settings_of(effect_class(own.effect))[name].unit for own in chosen.candidates for name in own.free]
-        return np.where(np.array(units) == "s", np.hypot(scatter, TIMING), scatter) if units else scatter
+        way = chosen.start - np.concatenate([candidate.neutral for candidate in chosen.candidates])
+        return np.sqrt(scatter**2 + (MEANING * way) ** 2 + np.where(np.array(units) == "s", TIMING, 0.0) ** 2)
 
     @property
     def effects(self) -> dict[str, Any]:
