@@ -6,6 +6,7 @@ import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from gsl.errors import ArtifactError, InputError
 from gsl.storage import manifest
@@ -50,8 +51,12 @@ class Ancestor:
         yield self
 
 
-Problem = tuple[str, ...]
-"""What is wrong, and what to do about it; nothing if all is well."""
+class Problem(NamedTuple):
+    """What is wrong, and what to do about it; nothing if all is well."""
+
+    what: str = ""
+    remedy: str = ""
+
 
 Seen = dict[Path, tuple[Manifest, Problem]]
 """Artifacts that were looked at, by absolute path, and what is wrong with their files: each is hashed once."""
@@ -73,12 +78,12 @@ def _trace(of: Parent | None, place: Path, child: Path, seen: Seen, depth: int) 
         stored, damage = again or _look_at(place)
     except (InputError, OSError) as error:
         return Ancestor(role, place, None, str(error).removeprefix(f"{place}: ").removeprefix(f"{place}/"))
-    problem = damage or _judge(stored.contents, expected, "was built anew since")
+    problem = damage if damage.what else _judge(stored.contents, expected, "was built anew since")
     if again is not None:
         return Ancestor(role, place, stored, *problem)
     if depth == LONGEST:
-        too_far = f"is {LONGEST} generations back; what it was made from is not looked at"
-        return Ancestor(role, place, stored, *(problem or (too_far,)))
+        too_far = Problem(f"is {LONGEST} generations back; what it was made from is not looked at")
+        return Ancestor(role, place, stored, *(problem if problem.what else too_far))
     seen[place.absolute()] = stored, damage
     made = (*stored.parents, *stored.links)
     above = [_trace(each, _place(place, each), place, seen, depth + 1) for each in made]
@@ -89,10 +94,10 @@ def _look_at(folder: Path) -> tuple[Manifest, Problem]:
     """Return the manifest of an artifact, and what is wrong with its files."""
     stored = manifest.read(folder)
     if damaged := manifest.find_damage(folder, stored):
-        return stored, (f"{damaged} {manifest.describe_damage(folder, damaged)}", manifest.REMEDY)
+        return stored, Problem(f"{damaged} {manifest.describe_damage(folder, damaged)}", manifest.REMEDY)
     if strange := next(manifest.strange_files(folder, stored), None):
-        return stored, (f"{strange} {manifest.STRANGE}", manifest.TAKE_OUT)
-    return stored, ()
+        return stored, Problem(f"{strange} {manifest.STRANGE}", manifest.TAKE_OUT)
+    return stored, Problem()
 
 
 def absence(child: Path) -> str:
@@ -106,7 +111,7 @@ def _place(folder: Path, parent: Parent) -> Path:
 
 def _judge(there: str, expected: str | None, problem: str) -> Problem:
     """Return what is wrong where another hash is expected."""
-    return () if expected in (None, there) else (problem, REPEAT)
+    return Problem() if expected in (None, there) else Problem(problem, REPEAT)
 
 
 def broken_link(folder: Path, stored: Manifest) -> str | None:
