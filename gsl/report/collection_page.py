@@ -38,7 +38,7 @@ def write_collection_page(
         walk: When the feet bear load in the first episode, if that is known.
         slides: Joints that slide.
     """
-    role, names = batch.metadata["role"], [about["policy"] for about in batch.metadata["episodes"]]
+    role, names = batch.metadata["role"], [_say(about["policy"]) for about in batch.metadata["episodes"]]
     steps = sum(map(len, batch.episodes))
     fallen = sum(episode.ended_in_a_fall for episode in batch.episodes)
     span = duration(steps * batch.control_period)
@@ -47,13 +47,21 @@ def write_collection_page(
     more = [_say_value(batch.episodes[:own], unit, noisy=noisy)] if own else []
     spent = [("episodes", str(len(batch))), ("time", span), ("rows", f"{steps:,}")]
     sections = [
-        section(in_unit("Episodes", unit.name), _table(batch, names, unit)),
-        section("Joint by joint", choice("joint", _draw(batch, slides)), note=f"The first episode, {names[0]}."),
+        section("Episodes", _table(batch, names, unit)),
+        section(
+            "Joint by joint",
+            choice("joint", _draw(batch, slides)),
+            note=f"The first episode, {names[0]}; what moves most comes first.",
+        ),
         footfalls([walk] if walk else []),
         budget(spent if role == REAL else [("real episodes", "none"), *((f"simulated {k}", v) for k, v in spent)]),
     ]
     answer = Answer("What was recorded?", f"{sentence} {_SIDES[role]}{ends}.", not fallen, more)
     write_page(folder, answer, sections)
+
+
+def _say(name: str) -> str:
+    return "π0" if name == "pi0" else name
 
 
 def _say_value(episodes: Sequence[Trajectory], unit: Unit, *, noisy: bool) -> str:
@@ -65,7 +73,7 @@ def _say_value(episodes: Sequence[Trajectory], unit: Unit, *, noisy: bool) -> st
 def _table(batch: Batch, names: Sequence[str], unit: Unit) -> Markup:
     """Return a row an episode."""
     valued = any(episode.reward is not None and np.any(episode.reward) for episode in batch.episodes)
-    columns = ["policy", "time [s]", *["value"] * valued, *["end"] * unit.falls]
+    columns = ["policy", "time [s]", *[in_unit("value", unit.name)] * valued, *["end"] * unit.falls]
     rows = []
     for name, episode in zip(names, batch.episodes, strict=True):
         end = "fell" if episode.ended_in_a_fall else "stood"
@@ -81,8 +89,8 @@ def _draw(batch: Batch, slides: Collection[str]) -> Mapping[str, Markup]:
         drawn = {f"state.{k}": (_STATE, None, first.state[:, k]) for k in range(first.state.shape[1])}
     else:
         drawn = {
-            joint: (scale_of(joint, slides), first.action[:, k], first.position[:, k])
-            for k, joint in enumerate(batch.joints)
+            batch.joints[k]: (scale_of(batch.joints[k], slides), first.action[:, k], first.position[:, k])
+            for k in np.argsort(-np.ptp(first.position, axis=0), kind="stable")
         }
     pictures = {}
     for name, (scale, command, seen) in drawn.items():

@@ -12,6 +12,7 @@ from markupsafe import Markup
 from gsl.core.unit import Unit
 from gsl.core.words import falls, in_unit, several
 from gsl.report.charts import Curve, line_chart
+from gsl.report.iteration import BEGUN
 from gsl.report.iteration_page import grounding
 from gsl.report.parts import section, table
 from gsl.report.run_page import Answer, Change, budget, parameters, write_page
@@ -58,7 +59,7 @@ def write_search_page(
     Args:
         folder: Where to write.
         winners: Of all generations, also those that are not to be tried.
-        tried: Names of those that are.
+        tried: Names of the policy where the search began, and of those that are.
         best: The best policy.
         metrics: Of the search.
         change: Of the policy, from the first to the best.
@@ -67,13 +68,14 @@ def write_search_page(
         spent: What the search cost in simulation.
     """
     begun = (check or {}).get("pi0") or {}
-    beside = f", π0 {unit.bare(begun['value'])}" if begun else ""
+    beside = f", {BEGUN[tried[0]]} {unit.bare(begun['value'])}" if begun else ""
     generations = several(len(winners), "generation")
     sentence = f"{best.name}, the best of {generations}, reaches {unit.format(best.value_sim)} in simulation{beside}."
     more = ["The best of many had luck as well: only `gsl evaluate` says what it is worth on the real side."]
     if drift := metrics.get("drift"):
-        shares = " and ".join(f"{name} {100.0 * share:.0f} %" for name, share in _ends(drift))
-        more.append(f"Of its time {shares} is spent where the grounding has seen nothing.")
+        first, *_, last = ((BEGUN.get(name, name), f"{100.0 * share:.0f} %") for name, share in drift.items())
+        spends = f"{last[0]} spends {last[1]} of its time where the grounding has seen nothing"
+        more.append(f"{spends}, {first[0]} {first[1]}.")
     failed = (check or {}).get("problems") or []
     sections = [
         section(in_unit("Best of each generation", unit.name), _table(winners, tried, metrics, unit)),
@@ -83,12 +85,6 @@ def write_search_page(
         budget([("real episodes", "none: a search acts in simulation alone"), *spent]),
     ]
     write_page(folder, Answer("How good a policy does the search find?", sentence, not failed, more), sections)
-
-
-def _ends(shares: Mapping[str, float]) -> list[tuple[str, float]]:
-    """Return the first and the last entry."""
-    names = list(shares)
-    return [(name, shares[name]) for name in dict.fromkeys((names[0], names[-1]))]
 
 
 def _table(winners: Sequence[Winner], tried: Sequence[str], metrics: Mapping[str, Any], unit: Unit) -> Markup:

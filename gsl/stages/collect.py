@@ -107,7 +107,7 @@ class Collect:
 
     def _write_page(self, folder: Path, batch: Batch, own: int) -> None:
         slides = self.world.plant.robot.slides if isinstance(self.world, BulletWorld) else ()
-        walk = read_footfalls(batch.metadata["episodes"][0]["policy"], batch.episodes[0])
+        walk = read_footfalls("the first episode", batch.episodes[0])
         unit, noisy = Unit.of(self.task), bool(self.action_noise)
         write_collection_page(folder, batch, own, unit, noisy=noisy, walk=walk, slides=slides)
 
