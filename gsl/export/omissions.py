@@ -31,7 +31,7 @@ def _parts(batch: Batch, held: set[str]) -> Iterator[tuple[str, str]]:
         yield GROUNDED, "what a grounding sent instead of an action"
     if any(episode.reward is not None for episode in episodes):
         yield REWARD, "rewards"
-    if any(episode.fell is not None for episode in episodes):
+    if any(episode.ended_in_a_fall for episode in episodes):
         yield FELL, "since when the robot lies on the ground"
     if sensors := sorted({name for episode in episodes for name in episode.sensors} - held):
         yield SENSORS, f"sensors: {', '.join(sensors)}"

@@ -24,7 +24,7 @@ def episode(length: int, phase: float) -> Trajectory:
     action = position[:-1] + 0.1 * np.cos(3.0 * time[:-1, None])
     velocity = np.cos(time[:, None] + phase + np.arange(len(JOINTS)))
     return Trajectory(
-        time, action, position, velocity, grounded_action=action + 0.01, reward=time[1:], fell=time > 1.5,
+        time, action, position, velocity, grounded_action=action + 0.01, reward=time[1:], fell=time > 2.0,
         sensors={"voltage": 12.0 + time},
     )  # fmt: skip
 
@@ -101,7 +101,8 @@ def test_minari_loads_its_data_set(batch: Batch, tmp_path: Path, monkeypatch: py
     for stored, episode in zip(data, batch.episodes, strict=True):
         np.testing.assert_array_equal(stored.observations, np.hstack([episode.position, episode.velocity]))
         np.testing.assert_array_equal(stored.actions, episode.action)
-        assert stored.truncations[-1] and not stored.terminations.any()
+        np.testing.assert_array_equal(stored.rewards, episode.reward)
+        assert stored.terminations[-1] == episode.ended_in_a_fall == (not stored.truncations[-1])
 
 
 SOME = [
