@@ -108,8 +108,8 @@ def test_a_learned_servo_says_its_gap_its_numbers_and_why_not_to_use_it(tmp_path
     numbers = {**model.numbers, "kp": np.log(0.6) * each, "delay": 0.02 * each, "offset": np.radians(-0.5) * each}
     groups = {name: {"floors_before": 9.0, "floors_after": 4.0, "learned": True} for name in model.groups}
     metrics = {
-        "floors_before": 9.0, "floors_after": 4.0, "learned": True, "groups": groups, "step": 0.002, "problems": ["it is too far"],
-        "walks": {"floors_before": 7.0, "floors_after": 3.0},
+        "floors_before": 9.0, "floors_after": 4.0, "learned": True, "groups": groups, "step": 0.002,
+        "problems": ["it is too far"], "walks": {"floors_before": 7.0, "floors_after": 3.0},
     }  # fmt: skip
     write_servo_page(
         tmp_path, metrics, replace(model, numbers=numbers), plant, 0.02, [float("nan"), 5.0, 4.5],
