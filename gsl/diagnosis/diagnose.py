@@ -158,6 +158,7 @@ def _judge(log: Log, rivals: Sequence[Hypothesis], trials: Sequence[Trial], opti
         how.walk_doubt if log.walking else how.shaking_doubt * log.shaking_share,
         log.walking,
         not log.by_record and log.motions == 1,
+        log.noise.source != "repeats" and not options.tolerance,
         how,
         noise_cost,
     )

@@ -24,7 +24,7 @@ from gsl.errors import GslError
 from gsl.rollout.cluster import find_cluster
 from gsl.rollout.rollout import Scenario, rollout
 
-TRIES = 3
+TRIES = 5  # deaths of workers in a row, without a job done between, after which it is given up
 
 
 def _some(workers: int) -> int:
@@ -94,15 +94,17 @@ def arriving(
             progress.advance()
             yield index, result
         return
-    missing = list(range(len(jobs)))
-    for _ in range(TRIES):
+    missing, in_vain = list(range(len(jobs))), 0
+    while in_vain < TRIES:
+        before = len(missing)
         for index, result in _arriving(function, frozen, jobs, tuple(missing), workers):
             missing.remove(index)
             progress.advance()
             yield index, result
         if not missing:
             return
-    raise GslError(f"worker processes died {TRIES} times in one batch of jobs; try workers=1 or look at free memory")
+        in_vain = in_vain + 1 if len(missing) == before else 0
+    raise GslError(f"worker processes died {TRIES} times before a job was done; try workers=1 or look at free memory")
 
 
 def _pickle(shared: Any, *, alone: bool) -> bytes:

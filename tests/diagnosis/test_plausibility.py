@@ -117,6 +117,17 @@ def test_a_cause_whose_interval_holds_what_does_nothing_is_none(
     assert all(reason.endswith("which does nothing") for reason in find_idle(cause, 1.0).values())
 
 
+def test_an_interval_holds_what_the_self_test_was_off_by_and_stays_off_doing_nothing() -> None:
+    late = claim("command_latency", [0.01], ("delay",))
+    late = replace(late, fit=replace(late.fit, covariance=np.diag([1e-4**2])))
+    (narrow,) = late.intervals(2.0)
+    assert narrow[:, 0] == pytest.approx([0.01 - 1.96 * 2e-4, 0.01 + 1.96 * 2e-4])
+    (wide,) = late.intervals(2.0, np.array([1e-3]))
+    assert wide[:, 0] == pytest.approx([0.01 - 1.96 * np.hypot(2e-4, 1e-3), 0.01 + 1.96 * np.hypot(2e-4, 1e-3)])
+    (open_below,) = late.intervals(2.0, np.array([0.02]))
+    assert open_below[0, 0] == pytest.approx(narrow[0, 0]) and open_below[1, 0] > 0.04
+
+
 def test_what_is_dropped_leaves_the_others_within_their_ranges() -> None:
     """A smaller set beyond its ranges is a little cheaper; the one within them shows that an effect is superfluous."""
     parts = (

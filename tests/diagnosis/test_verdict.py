@@ -65,6 +65,17 @@ def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
     assert min(cause.probability for cause in tried.causes) > VerdictSettings.unrivalled
 
 
+@pytest.mark.parametrize(
+    ("cost", "guessed", "word"), [(60.0, True, "unknown"), (60.0, False, "causes"), (90.0, True, "causes")]
+)
+def test_within_a_guessed_noise_nothing_is_named(cost: float, guessed: bool, word: str) -> None:
+    """A log of joints that shake and of no repeats: its roughness is no noise floor."""
+    none = replace(NONE, costs=np.full(8, cost))
+    better = replace(selection(friction("all", 0.3 * cost)), none=none)
+    verdict = Judge(1.0, guessed=guessed).judge(better)
+    assert (verdict.word, verdict.hollow) == (word, word == "unknown")
+
+
 def test_a_spurious_effect_that_is_cheapest_and_fails_hides_no_other() -> None:
     """It gains much in one sample of eight and nothing elsewhere, the right one in every sample."""
     right, none = friction("all", 100.0), replace(NONE, costs=np.array([8000.0] + 7 * [114.0]))

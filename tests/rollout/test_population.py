@@ -79,6 +79,14 @@ def _dies_once(marker: Path, frozen: bytes, job: Job) -> int:
     return job.seed
 
 
+def _dies_at_first(marker: Path, frozen: bytes, job: Job) -> int:
+    own = marker.with_name(f"{job.seed}")
+    if not own.exists():
+        own.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return job.seed
+
+
 def _dies(marker: Path, frozen: bytes, job: Job) -> int:
     os.kill(os.getpid(), signal.SIGKILL)
     return 0
@@ -115,6 +123,13 @@ def test_a_world_whose_effect_hooks_a_closure_goes_to_workers() -> None:
 
 def test_a_killed_worker_costs_only_its_own_jobs(tmp_path: Path) -> None:
     assert _in_parallel(_dies_once, tmp_path) == list(range(10, 16))
+
+
+def test_workers_may_die_more_often_than_in_vain(tmp_path: Path) -> None:
+    jobs = [Job(np.zeros(1), seed) for seed in range(3 * parallel.TRIES)]
+    with QUIET.progress(len(jobs), "") as progress:
+        done = parallel.in_parallel(partial(_dies_at_first, tmp_path / "died"), arm(), jobs, 2, progress)
+    assert done == list(range(3 * parallel.TRIES))
 
 
 def test_workers_that_always_die_end_in_one_clear_line(tmp_path: Path) -> None:

@@ -1,7 +1,8 @@
 """The foreign generator: robots by another hand's servo model at 0.5 ms, with effects built in from their meaning.
 
-The rigid bodies are the robot's own; everything between command and gear is `foreign_servo`. What an effect does is
-written down here once more, from the table in the design, and not taken from gsl/effects.
+Everything between command and gear is `foreign_servo`. What an effect does is written down here once more, from its
+meaning, and not taken from gsl/effects. The bodies are moved by gsl's chain model here, which is fast enough to dial
+effects, and by MuJoCo in `rigid_mujoco`, which makes the logs; a test holds the two together.
 """
 
 from __future__ import annotations
@@ -54,7 +55,7 @@ def play_foreign(
     The arguments are those of `same.play_same`.
     """
     rows, bias, armature = build_rows(plant, effects)
-    tree = chain(_embody(plant, effects), (1.0 - ON_ROTOR) * armature)
+    tree = chain(embody(plant, effects), (1.0 - ON_ROTOR) * armature)
     extras, state = extra_rows(plant, extra), np.zeros((2, len(armature)))
     rest, paths = targets[0][0].copy(), []
     for path, start in zip(targets, starts, strict=True):
@@ -106,8 +107,8 @@ def _narrow(rows: np.ndarray, plant: Plant, mask: np.ndarray, entry: Mapping[str
             rows[servo.UPPER, k] = joint.upper - entry["reduction"]
 
 
-def _embody(plant: Plant, effects: Mapping[str, Any]) -> Plant:
-    """Return the plant with other links and another gravity."""
+def embody(plant: Plant, effects: Mapping[str, Any]) -> Plant:
+    """Return the plant with the links and the gravity that effects give it."""
     for name, entry in _entries(effects):
         links = dict(plant.robot.links)
         if name == "link_mass":
@@ -149,20 +150,27 @@ def _play(
     for count in range(settling + len(path) * ticks):
         since = (count - settling) * STEP
         if count >= settling and (count - settling) % ticks == 0:
-            _note(p, ring, count, motion, said, (count - settling) // ticks)
-        for i in range(n):
-            wanted[i] = _average(path, i, (since - p[servo.DELAY, i]) / period, STEP / period)
+            note(p, ring, count, motion, said, (count - settling) // ticks)
+        delay_commands(p, path, since, period, wanted)
         servo.foreign_torque(p, state, ring, count, motion, wanted, since, STEP, torque)
         extra_torque(rows, extras, rest, motion, state[servo.MOTOR], STEP, torque)
         accelerate(tree, motion, pushed, torque, work, matrix)
         for i in range(n):
             motion[1, i] += STEP * torque[i]
             motion[0, i] += STEP * motion[1, i]
-    _note(p, ring, settling + len(path) * ticks, motion, said, len(path))
+    note(p, ring, settling + len(path) * ticks, motion, said, len(path))
 
 
 @compile_kernel
-def _note(p: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, said: np.ndarray, row: int) -> None:
+def delay_commands(p: np.ndarray, path: np.ndarray, since: float, period: float, wanted: np.ndarray) -> None:
+    """Fill `wanted` [rad], shape (n_motors,), with the late commands that act from a time [s] on."""
+    for i in range(len(wanted)):
+        wanted[i] = _average(path, i, (since - p[servo.DELAY, i]) / period, STEP / period)
+
+
+@compile_kernel
+def note(p: np.ndarray, ring: np.ndarray, count: int, motion: np.ndarray, said: np.ndarray, row: int) -> None:
+    """Write what the encoders read at a physics step into a row of `said` [rad], shape (T + 1, n_motors)."""
     for i in range(motion.shape[1]):
         said[row, i] = servo.measure_late(p, ring, count, motion, i, STEP)[0]
 

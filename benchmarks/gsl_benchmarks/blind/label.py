@@ -20,7 +20,7 @@ class Label:
     Attributes:
         case: Its name.
         kind: One of KINDS.
-        generator: `same` (gsl's chain model, or Bullet on the ground) or `foreign`.
+        generator: `same` (gsl's chain model, or Bullet on the ground) or `foreign` (other servos in MuJoCo).
         strength: `none`, `weak`, `medium` or `strong`.
         gap: What the causes alone do, in floors: rms of what they change in the nominal simulator's replay, and noise.
         effects: As a world's `effects:`, one entry each.
@@ -29,6 +29,7 @@ class Label:
         without: Effects that the answering library has to do without.
         programme: Number of the commands.
         noise: Standard deviation of the encoders [rad].
+        clock: Standard deviation of the logger's clock, in control periods.
     """
 
     case: str
@@ -42,6 +43,7 @@ class Label:
     without: tuple[str, ...] = ()
     programme: int = 0
     noise: float = 0.0
+    clock: float = 0.0
 
     @property
     def truth(self) -> tuple[str, ...]:

@@ -21,11 +21,14 @@ from gsl_benchmarks.blind.jitter import NOISE, jitter
 from gsl_benchmarks.blind.label import ABSENT, FOREIGN, JOINT, NULL, SAME, TWO, WITHHELD, Label
 from gsl_benchmarks.blind.mix import Slot
 from gsl_benchmarks.blind.programmes import Programme
+from gsl_benchmarks.blind.rigid_mujoco import play_mujoco
 from gsl_benchmarks.blind.same import play_same
 from gsl_benchmarks.blind.strength import Player, Yardstick, turn_up
 
-PLAYERS: Mapping[str, Player] = {SAME: play_same, FOREIGN: play_foreign}
+PLAYERS: Mapping[str, Player] = {SAME: play_same, FOREIGN: play_mujoco}
+DIALLED: Mapping[str, Player] = {SAME: play_same, FOREIGN: play_foreign}  # the same robots, forty times as fast
 START = 0.02  # spread of the joints before the first command is held [rad]
+JITTERING, CLOCK = 0.25, (0.05, 0.3)  # share of loggers whose clock jitters; its standard deviation [periods]
 TRIES = 3  # draws of an effect before the next one has its turn
 
 
@@ -62,7 +65,10 @@ class Workshop:
     def case(self, name: str, slot: Slot, rng: np.random.Generator) -> Case:
         """Make one case."""
         noise = float(rng.uniform(*NOISE))
-        label = Label(name, slot.kind, slot.generator, slot.strength, programme=slot.programme, noise=noise)
+        clock = float(rng.uniform(*CLOCK)) if rng.random() < JITTERING else 0.0
+        label = Label(
+            name, slot.kind, slot.generator, slot.strength, programme=slot.programme, noise=noise, clock=clock
+        )
         if slot.kind != NULL:
             label = self._add_causes(label, slot, rng)
         robot = jitter(self.plant, rng)
@@ -72,7 +78,7 @@ class Workshop:
 
     def _add_causes(self, label: Label, slot: Slot, rng: np.random.Generator) -> Label:
         """Return the label with causes of the strength that the slot wants."""
-        player, programme = PLAYERS[slot.generator], self.programmes[slot.programme]
+        player, programme = DIALLED[slot.generator], self.programmes[slot.programme]
         yardstick = Yardstick.of(self.plant, self.step, self.period, player, programme)
         if slot.kind == ABSENT:
             dial, share, gap = _dial(tuple(EXTRAS), yardstick, label, slot.turn, rng)
@@ -96,12 +102,24 @@ class Workshop:
         played = PLAYERS[label.generator](robot, label.effects, label.extra, targets, starts, self.period)
         episodes = []
         for commands, path in zip(programme.commands, played, strict=True):
-            position = path[:, :n] + label.noise * rng.standard_normal((len(path), n))
             times = self.period * np.arange(len(path))
+            position = log_readings(times, path[:, :n], label.clock * self.period, label.noise, rng)
             episodes.append(Trajectory(times, commands, position, slope(position, self.period)))
         about = {"robot": body.name, "role": "real", "source": "gsl blind"}
         names = [{"policy": name} for name in programme.names]
         return Batch(tuple(episodes), body.controlled, self.period, {**about, "episodes": names})
+
+
+def log_readings(
+    times: np.ndarray, path: np.ndarray, jitter: float, noise: float, rng: np.random.Generator
+) -> np.ndarray:
+    """Return what a logger with noise [rad] and a jittering clock [s] has of a path, as an import puts it on rows."""
+    stamps = times + jitter * np.clip(rng.standard_normal(len(times)), -1.5, 1.5)  # stays in order up to 0.3 periods
+    read = np.stack([np.interp(stamps, times, column) for column in path.T], axis=1)
+    read += noise * rng.standard_normal(path.shape)
+    if jitter <= 0.0:
+        return read
+    return np.stack([np.interp(times, stamps, column) for column in read.T], axis=1)
 
 
 def rng_of(secret: str, *parts: int | str) -> np.random.Generator:

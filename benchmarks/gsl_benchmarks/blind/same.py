@@ -1,4 +1,4 @@
-"""The same generator: gsl's own servos and chain model at 1 ms, and the extras, as robots that play a programme."""
+"""The same generator: gsl's own servos and chain model at 0.5 ms, and the extras, as robots that play a programme."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gsl.worlds.servo import encoder_motion, servo_torque
 from gsl.worlds.servo_state import COMMANDS, DRIVE, MEMORY, SMOOTHED, SPEED, ServoParameters, ServoState
 from gsl_benchmarks.blind.extras import extra_rows, extra_torque
 
-STEP = 0.001  # physics period [s]
+STEP = 0.0005  # physics period [s]: robots have none, and at 1 ms a delay is half of one longer
 SETTLE = 25  # control periods for which the first command is held before a motion begins
 
 

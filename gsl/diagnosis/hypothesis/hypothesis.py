@@ -63,18 +63,22 @@ class Hypothesis:
         """All parameters in one row, as a fit takes them."""
         return np.concatenate([np.zeros(0), *self.parameters])
 
-    def intervals(self, widening: float) -> tuple[np.ndarray, ...]:
+    def intervals(self, widening: float, scatter: np.ndarray | None = None) -> tuple[np.ndarray, ...]:
         """Return the 95 % interval of the parameters of each effect, within their bounds, shapes (2, p).
+
+        Scatter does not take an interval to or beyond what does nothing: that something is there, the gain has shown.
 
         Args:
             widening: How much wider than noise alone makes it.
+            scatter: Root mean square error of each parameter in logs of a known truth, shape (n_parameters,).
         """
-        sd = np.sqrt(np.maximum(0.0, np.diag(self.fit.covariance))) * widening
-        parts = np.split(sd, np.cumsum([len(values) for values in self.parameters])[:-1]) if self.size else []
-        return tuple(
-            np.clip([values - Z95 * part, values + Z95 * part], candidate.bounds[0], candidate.bounds[1])
-            for (candidate, values), part in zip(self.pairs, parts, strict=True)
-        )
+        if not self.size:
+            return ()
+        noise = np.sqrt(np.maximum(0.0, np.diag(self.fit.covariance))) * widening
+        total = noise if scatter is None else np.hypot(noise, scatter)
+        ends = np.cumsum([len(values) for values in self.parameters])[:-1]
+        parts = zip(self.pairs, np.split(noise, ends), np.split(total, ends), strict=True)
+        return tuple(_interval(candidate, values, narrow, wide) for (candidate, values), narrow, wide in parts)
 
     @property
     def claims_its_names(self) -> bool:
@@ -101,6 +105,14 @@ class Hypothesis:
         effect = chosen.candidates[k].effect
         beside = [(other.effect, other.fixed) for index, other in enumerate(chosen.candidates) if index != k]
         return all(own.effect != effect or (own.effect, own.fixed) in beside for own in self.candidates)
+
+
+def _interval(candidate: Candidate, values: np.ndarray, noise: np.ndarray, total: np.ndarray) -> np.ndarray:
+    low, high = values - Z95 * total, values + Z95 * total
+    narrow = values - Z95 * noise, values + Z95 * noise
+    low = np.where((low <= candidate.neutral) & (narrow[0] > candidate.neutral), narrow[0], low)
+    high = np.where((high >= candidate.neutral) & (narrow[1] < candidate.neutral), narrow[1], high)
+    return np.clip([low, high], candidate.bounds[0], candidate.bounds[1])
 
 
 def by_cost(hypothesis: Hypothesis) -> float:

@@ -88,6 +88,12 @@ def _log(findings: Findings) -> Iterator[str]:
         yield f"Differences of {1e3 * tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
     elif findings.verdict.word == "unknown" and findings.verdict.remaining > findings.options.verdict.rough:
         yield _ask_for_a_floor(findings)
+    elif findings.verdict.hollow:
+        named = ", ".join(dict.fromkeys(findings.selection.chosen.names)).replace("_", " ")
+        yield (
+            f"The log is so rough that even the plain simulator is within its noise. {named.capitalize()} fits better, "
+            "but nothing says that it has to: record a motion twice, which measures the noise."
+        )
 
 
 def _ask_for_a_floor(findings: Findings) -> str:

@@ -120,7 +120,7 @@ def _of(scope: str) -> str:
 def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
     chosen = findings.selection.chosen
     candidate, values = chosen.pairs[cause.index]
-    interval = chosen.intervals(findings.widening)[cause.index]
+    interval = chosen.intervals(findings.widening, findings.scatter)[cause.index]
     sure = cause.probability >= findings.options.verdict.sure
     return {
         "effect": candidate.effect,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,20 +10,24 @@ from typing import Any
 import numpy as np
 
 from gsl.core.plant import Plant
+from gsl.core.setting import settings_of
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Baseline
 from gsl.diagnosis.search.stepwise import Selection
-from gsl.diagnosis.simulate.calibration import calibrate, to_effects
+from gsl.diagnosis.simulate.calibration import HALF_STEP, calibrate, to_effects
 from gsl.diagnosis.simulate.in_the_air import change
 from gsl.diagnosis.simulate.simulator import Simulator
 from gsl.diagnosis.verdict.self_test import Trial
 from gsl.diagnosis.verdict.servo_law import Form, Laws
 from gsl.diagnosis.verdict.verdict import Verdict
-from gsl.effects.effect import together
+from gsl.effects.effect import effect_class, together
 from gsl.storage.diagnosis_report import DIGITS
+
+MEANING = 0.03  # spread of a value between two codes of one effect, share of its way from doing nothing. Estimate
+TIMING = HALF_STEP / math.sqrt(3.0)  # spread of lags between simulators that are up to half a step apart [s]
 
 
 @dataclass(frozen=True)
@@ -86,6 +91,22 @@ class Findings:
     def widening(self) -> float:
         """How much wider an interval is than noise alone makes it."""
         return self.options.verdict.widening(self.verdict.remaining)
+
+    @property
+    def scatter(self) -> np.ndarray:
+        """What the chosen hypothesis' parameters are off by beside noise, shape (n_parameters,).
+
+        That is their root mean square error in the self-test and, where the log is not of one of gsl's own simulators,
+        what two simulators differ by that mean the same.
+        """
+        chosen = self.selection.chosen
+        errors = [trial.errors for trial in self.trials if trial.truth == chosen.names]
+        scatter = np.sqrt(np.mean(np.square(errors), axis=0)) if errors else np.zeros(len(chosen.start))
+        if self.log.made_at is not None or not chosen.size:
+            return scatter
+        units = [settings_of(effect_class(own.effect))[name].unit for own in chosen.candidates for name in own.free]
+        way = chosen.start - np.concatenate([candidate.neutral for candidate in chosen.candidates])
+        return np.sqrt(scatter**2 + (MEANING * way) ** 2 + np.where(np.array(units) == "s", TIMING, 0.0) ** 2)
 
     @property
     def effects(self) -> dict[str, Any]:

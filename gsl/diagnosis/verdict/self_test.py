@@ -1,7 +1,8 @@
 """The self-test: the diagnosis of logs that the simulator makes of the user's own commands, whose causes are known.
 
 From calibration alone it learns what chance gains; from each surviving cause what is left when that is the truth, and
-by how much it then beats the others.
+by how much it then beats the others. These logs are made at another step by another scheme: how far off their causes'
+values then come out is part of what a value is uncertain by.
 """
 
 from __future__ import annotations
@@ -35,12 +36,14 @@ class Trial:
         answer: Effects of the hypothesis that won.
         costs: Held-out cost of each hypothesis that was fitted, in the order of the rivals.
         level: Of the truth.
+        errors: Of the parameters that were fitted for the truth, shape (n_parameters,).
     """
 
     truth: tuple[str, ...]
     answer: tuple[str, ...]
     costs: tuple[float, ...]
     level: float
+    errors: np.ndarray
 
 
 def relog(
@@ -107,6 +110,7 @@ def duel(log: Log, problem: Problem, rivals: Sequence[Hypothesis], options: Opti
             still = no_shifts(fake.train.joints)
             fits = [fake.fit(rival.candidates, rival.start, still) for rival in rivals]
             winner = min(fits, key=by_cost)
-            trials.append(Trial(truth.names, winner.names, tuple(fit.cost for fit in fits), fits[k].level))
+            costs, errors = tuple(fit.cost for fit in fits), fits[k].start - truth.start
+            trials.append(Trial(truth.names, winner.names, costs, fits[k].level, errors))
             problem.tick("")
     return trials

@@ -50,6 +50,7 @@ class Verdict:
         complete: Probability that nothing else is at work.
         missing: What a law of each servo explains beyond it: see `Laws.missing`.
         whole: Share of the excess from which on causes are all there is.
+        hollow: Whether calibration alone is so far within a guessed noise that nothing has to be explained.
     """
 
     word: str
@@ -60,6 +61,7 @@ class Verdict:
     complete: float
     whole: float = VerdictSettings.whole
     missing: float = 0.0
+    hollow: bool = False
 
     @property
     def names_causes(self) -> bool:
@@ -82,6 +84,7 @@ class Judge:
         doubt: Share of a cost by which that of two causes differs by chance.
         walking: Whether the robot is on the ground, where the base shows what is alike in the air.
         lone: Whether there is one motion only.
+        guessed: Whether the noise floor is a guess: nothing was repeated, and nobody said what does not matter.
         settings: What counts.
         noise_cost: Of a residual that is nothing but noise.
     """
@@ -91,6 +94,7 @@ class Judge:
     doubt: float = 0.0
     walking: bool = False
     lone: bool = False
+    guessed: bool = False
     settings: VerdictSettings = field(default_factory=VerdictSettings)
     noise_cost: float = SearchSettings.noise_cost
 
@@ -117,8 +121,9 @@ class Judge:
         groups = self._inseparable(chosen, causes)
         sure = complete * (how.lone if self.lone else 1.0)
         scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
-        word = "unknown" if complete < 0.5 else "inseparable" if groups else "causes"
-        return Verdict(word, scaled, groups, explained, remaining, complete, how.whole, missing)
+        hollow = self.guessed and none.level < how.beneath * self.expected
+        word = "unknown" if hollow or complete < 0.5 else "inseparable" if groups else "causes"
+        return Verdict(word, scaled, groups, explained, remaining, complete, how.whole, missing, hollow)
 
     def _inseparable(self, chosen: Hypothesis, causes: tuple[Cause, ...]) -> tuple[tuple[str, ...], ...]:
         alike = () if self.walking else ALIKE
