@@ -31,10 +31,10 @@ def servo_curves(path: Path, plant: Plant, model: ServoModel, step: float, perio
         period: Control period [s].
     """
     title = "What the servo has learned: how a joint answers a step, and what constant speed costs"
-    save(servo_curves_figure(plant, model, step, period, shown_groups(plant, model), title=title), path)
+    save(servo_curves_figure(plant, model, step, period, list_groups(plant, model), title=title), path)
 
 
-def shown_groups(plant: Plant, model: ServoModel) -> list[int]:
+def list_groups(plant: Plant, model: ServoModel) -> list[int]:
     """Return the groups, by number, that have a joint of their own."""
     return [g for g in range(len(model.groups)) if (_members(model, plant) == g).any()]
 

@@ -15,7 +15,7 @@ from gsl.report.account import servo_table
 from gsl.report.charts import Curve, line_chart
 from gsl.report.parts import bullets, choice, prose, section, table
 from gsl.report.run_page import Answer, budget, write_page
-from gsl.report.servo_curves import servo_curves_figure, shown_groups
+from gsl.report.servo_curves import list_groups, servo_curves_figure
 from gsl.report.svg import WIDTH, svg
 
 _DEGREES = 180.0 / np.pi
@@ -64,7 +64,7 @@ def write_servo_page(
     titles, rows = servo_table(metrics)
     pictures = {
         model.groups[g]: svg(servo_curves_figure(plant, model, step, period, [g], width=WIDTH), "curves of the servo")
-        for g in shown_groups(plant, model)
+        for g in list_groups(plant, model)
     }
     sections = [
         section(

@@ -117,7 +117,15 @@ class Optimize:
         )
         tried, check = [theta.name for theta in thetas], read_check(folder / REPORT)
         write_search_page(
-            folder, winners, tried, best, metrics, change, Unit.of(self.task), check=check, spent=self._spent(winners)
+            folder,
+            winners,
+            tried,
+            best,
+            metrics,
+            change,
+            Unit.of(self.task),
+            check=check,
+            spent=self._count_played(winners),
         )
         return metrics
 
@@ -168,7 +176,7 @@ class Optimize:
                 note_step("learner", index + 1, value=value, falls=done.falls[0])
                 yield Winner(self._record(index, parameters, value), done)
 
-    def _spent(self, winners: Sequence[Winner]) -> list[tuple[str, str]]:
+    def _count_played(self, winners: Sequence[Winner]) -> list[tuple[str, str]]:
         """Return what was played in simulation, in words."""
         done = [winner.generation for winner in winners]
         played = sum(sum(step.played) if step.played else len(step.values) * self.rollouts for step in done)

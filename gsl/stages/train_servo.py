@@ -99,7 +99,7 @@ class TrainServo:
         noise = dict(zip(model.joints, model.noise.tolist(), strict=True))
         metrics |= {"torque_noise": noise, "problems": problems(metrics)}
         way = [progress.level for progress in learned.way]
-        write_servo_page(folder, metrics, model, self.sim.plant, exp.period, way, spent=_spent(exp, learned))
+        write_servo_page(folder, metrics, model, self.sim.plant, exp.period, way, spent=_count_real(exp, learned))
         return metrics
 
     def _walks(self, exp: Log) -> Walks | None:
@@ -138,7 +138,7 @@ class TrainServo:
         (folder / WORLD).write_text(f"# The simulator with a learned servo: {gap}.\n{text}", encoding="utf-8")
 
 
-def _spent(exp: Log, learned: LearnedServo) -> list[tuple[str, str]]:
+def _count_real(exp: Log, learned: LearnedServo) -> list[tuple[str, str]]:
     """Return what real data the servo was learned from, in words."""
     seconds = exp.period * sum(len(record.targets) for record in exp.records)
     fitted, judged, tested = learned.windows
