@@ -114,8 +114,8 @@ def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
 
 def servo_table(metrics: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return titles and rows of what a learned servo leaves [noise floors], by group of joints."""
-    groups = {"all": metrics, **metrics["groups"]}
-    rows = [
+    groups: Mapping[str, Mapping[str, Any]] = {"all": metrics, **metrics["groups"]}
+    rows: list[tuple[str, ...]] = [
         (
             name,
             f"{figures['floors_before']:.2f}",

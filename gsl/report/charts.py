@@ -83,7 +83,7 @@ def line_chart(
             axes.axhline(mark, color=INK, linewidth=1.0, linestyle=(0, (4, 3)))
         axes.set_ylim(bottom=0.0 if zero else None)
         axes.margins(x=0.0)
-        axes.xaxis.get_major_locator().set_params(integer=counted)
+        axes.locator_params(axis="x", integer=counted)
         _name(axes, x, y)
         names = [name for name in reversed(labels) if name]
         whole.legend(

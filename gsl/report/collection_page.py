@@ -85,6 +85,7 @@ def _table(batch: Batch, names: Sequence[str], unit: Unit) -> Markup:
 def _draw(batch: Batch, slides: Collection[str]) -> Mapping[str, Markup]:
     """Return a picture of each joint in the first episode, or of each entry of a state that is not joints."""
     first, kind = batch.episodes[0], _KINDS[batch.metadata["role"]]
+    drawn: dict[str, tuple[Scale, np.ndarray | None, np.ndarray]]
     if first.state is not None:
         drawn = {f"state.{k}": (_STATE, None, first.state[:, k]) for k in range(first.state.shape[1])}
     else:
@@ -92,7 +93,7 @@ def _draw(batch: Batch, slides: Collection[str]) -> Mapping[str, Markup]:
             batch.joints[k]: (scale_of(batch.joints[k], slides), first.action[:, k], first.position[:, k])
             for k in np.argsort(-np.ptp(first.position, axis=0), kind="stable")
         }
-    pictures = {}
+    pictures: dict[str, Markup] = {}
     for name, (scale, command, seen) in drawn.items():
         curves = [_curve("command", "command", first.time, command, scale)] if command is not None else []
         curves.append(_curve("measured", kind, first.time, seen, scale))
