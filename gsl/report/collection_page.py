@@ -41,11 +41,11 @@ def write_collection_page(
     role, names = batch.metadata["role"], [_say(about["policy"]) for about in batch.metadata["episodes"]]
     steps = sum(map(len, batch.episodes))
     fallen = sum(episode.ended_in_a_fall for episode in batch.episodes)
-    span = duration(steps * batch.control_period)
+    span = f"{steps:,} steps" if batch.states else duration(steps * batch.control_period)
     ends = f", with {falls(fallen)}" if unit.falls else ""
     sentence = f"{several(len(batch), 'episode')} of {span} in all {'were' if len(batch) > 1 else 'was'} recorded"
     more = [_say_value(batch.episodes[:own], unit, noisy=noisy)] if own else []
-    spent = [("episodes", str(len(batch))), ("time", span), ("rows", f"{steps:,}")]
+    spent = [("episodes", str(len(batch))), ("time", "" if batch.states else span), ("steps", f"{steps:,}")]
     sections = [
         section("Episodes", _table(batch, names, unit)),
         section(

@@ -67,8 +67,8 @@ def write_search_page(
         check: What grounding.json says, if there is one.
         spent: What the search cost in simulation.
     """
-    begun = (check or {}).get("pi0") or {}
-    beside = f", {BEGUN[tried[0]]} {unit.bare(begun['value'])}" if begun else ""
+    begun = ((check or {}).get("pi0") or {}).get("value")  # the check of a model of states tells none
+    beside = "" if begun is None else f", {BEGUN[tried[0]]} {unit.bare(begun)}"
     generations = several(len(winners), "generation")
     sentence = f"{best.name}, the best of {generations}, reaches {unit.format(best.value_sim)} in simulation{beside}."
     more = ["The best of many had luck as well: only `gsl evaluate` says what it is worth on the real side."]

@@ -63,6 +63,10 @@ def test_a_search_in_a_task_without_falls_names_none_and_a_failed_check_is_said(
         check={"pi0": {"value": 1.0}, "problems": ["π0 falls"]}, spent=[],
     )  # fmt: skip
     said = seen(tmp_path)
+    write_search_page(
+        tmp_path, [alone], ["start"], alone.policy, metrics, CHANGE, UNIT, check={"pi0": {"real": {}}}, spent=[]
+    )
+    assert "reaches 300.0 cm/s in simulation." in seen(tmp_path)  # a check of states knows no value of π0
     assert "reaches 3.0 in simulation, where it began 1.0." in said and "The check says: π0 falls." in said
     assert "generation in simulation mean of its worst episodes generation_01 3.0 3.0" in said
 
@@ -84,7 +88,7 @@ def test_what_was_collected_is_told_episode_by_episode(tmp_path: Path) -> None:
     assert "3 episodes of 3 s in all were recorded on the real side, with 1 fall." in said
     assert "π0 with noise reaches 21.0 cm/s (95 % 8.3 to 33.7) in 2 episodes." in said  # ± 12.7 · 0.1 · √2 / √2 · 10
     assert "π0 1.00 20.0 stood π0 1.00 22.0 stood neighbour_01 1.00 5.0 fell" in said
-    assert "knee [°]" in said and "rail [mm]" in said and "episodes 3 time 3 s rows 150" in said
+    assert "knee [°]" in said and "rail [mm]" in said and "episodes 3 time 3 s steps 150" in said
     check_seen(tmp_path / "report.html", "with 1 fall", "knee [°]", "left")
 
 
@@ -97,7 +101,7 @@ def test_simulated_trajectories_of_an_environment_cost_nothing_real(tmp_path: Pa
     )  # fmt: skip
     write_collection_page(tmp_path, batch, 0, Unit(falls=False), noisy=False, walk=None, slides=())
     said = seen(tmp_path)
-    assert "1 episode of 1 s in all was recorded in simulation." in said and "state.1" in said
+    assert "1 episode of 50 steps in all was recorded in simulation." in said and "state.1" in said
     assert "policy time [s] steps 1.00" in said and "real episodes none" in said
 
 
