@@ -49,9 +49,9 @@ def write_collection_page(
     sections = [
         section("Episodes", _table(batch, names, unit)),
         section(
-            "Joint by joint",
-            choice("joint", _draw(batch, slides)),
-            note=f"The first episode, {names[0]}; what moves most comes first.",
+            "State over time" if batch.states else "Joint by joint",
+            choice("state" if batch.states else "joint", _draw(batch, slides)),
+            note=f"The first episode, {names[0]}{'' if batch.states else '; what moves most comes first'}.",
         ),
         footfalls([walk] if walk else []),
         budget(spent if role == REAL else [("real episodes", "none"), *((f"simulated {k}", v) for k, v in spent)]),

@@ -101,7 +101,8 @@ def test_simulated_trajectories_of_an_environment_cost_nothing_real(tmp_path: Pa
     )  # fmt: skip
     write_collection_page(tmp_path, batch, 0, Unit(falls=False), noisy=False, walk=None, slides=())
     said = seen(tmp_path)
-    assert "1 episode of 50 steps in all was recorded in simulation." in said and "state.1" in said
+    assert "1 episode of 50 steps in all was recorded in simulation." in said and "State over time" in said
+    assert "state.1" in said and "Joint" not in said
     assert "policy time [s] steps 1.00" in said and "real episodes none" in said
 
 
