@@ -22,6 +22,7 @@ from gsl.report.shown import Scale, scale_of
 _SIDES = {REAL: "on the real side", SIM: "in simulation"}
 _KINDS = {REAL: "real", SIM: "before"}  # of the line of a joint
 _STATE = Scale(1.0, "")
+DRAWN = 6  # of joints or entries of a state: a picture costs 70 ms
 
 
 def write_collection_page(
@@ -51,7 +52,7 @@ def write_collection_page(
         section(
             "State over time" if batch.states else "Joint by joint",
             choice("state" if batch.states else "joint", _draw(batch, slides)),
-            note=f"The first episode, {names[0]}{'' if batch.states else '; what moves most comes first'}.",
+            note=f"The first episode, {names[0]}; what moves most, {DRAWN} pictures at most.",
         ),
         footfalls([walk] if walk else []),
         budget(spent if role == REAL else [("real episodes", "none"), *((f"simulated {k}", v) for k, v in spent)]),
@@ -83,15 +84,16 @@ def _table(batch: Batch, names: Sequence[str], unit: Unit) -> Markup:
 
 
 def _draw(batch: Batch, slides: Collection[str]) -> Mapping[str, Markup]:
-    """Return a picture of each joint in the first episode, or of each entry of a state that is not joints."""
+    """Return pictures of the joints, or of entries of a state that is not joints, that move most in the first episode."""
     first, kind = batch.episodes[0], _KINDS[batch.metadata["role"]]
+    moving = np.argsort(-np.ptp(first.position if first.state is None else first.state, axis=0), kind="stable")[:DRAWN]
     drawn: dict[str, tuple[Scale, np.ndarray | None, np.ndarray]]
     if first.state is not None:
-        drawn = {f"state.{k}": (_STATE, None, first.state[:, k]) for k in range(first.state.shape[1])}
+        drawn = {f"state.{k}": (_STATE, None, first.state[:, k]) for k in moving}
     else:
         drawn = {
             batch.joints[k]: (scale_of(batch.joints[k], slides), first.action[:, k], first.position[:, k])
-            for k in np.argsort(-np.ptp(first.position, axis=0), kind="stable")
+            for k in moving
         }
     pictures: dict[str, Markup] = {}
     for name, (scale, command, seen) in drawn.items():
