@@ -84,7 +84,7 @@ def _table(batch: Batch, names: Sequence[str], unit: Unit) -> Markup:
 
 
 def _draw(batch: Batch, slides: Collection[str]) -> Mapping[str, Markup]:
-    """Return pictures of the joints, or of entries of a state that is not joints, that move most in the first episode."""
+    """Return pictures of what moves most in the first episode: joints, or entries of a state that is not joints."""
     first, kind = batch.episodes[0], _KINDS[batch.metadata["role"]]
     moving = np.argsort(-np.ptp(first.position if first.state is None else first.state, axis=0), kind="stable")[:DRAWN]
     drawn: dict[str, tuple[Scale, np.ndarray | None, np.ndarray]]
