@@ -42,6 +42,11 @@ def answer_difference(question: str, what: str, difference: Interval, unit: Unit
     return Answer(question, name_difference(what, difference, unit), is_significant(difference), more)
 
 
+def _say(method: str) -> str:
+    """Return what a sentence calls a method: `none is best` would say that no method is."""
+    return "the search without grounding" if method == "none" else method
+
+
 def answer_comparison(results: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> Answer:
     """Return how the best method of each world stands to the first method, or what it is worth if that is the first.
 
@@ -59,13 +64,13 @@ def answer_comparison(results: Sequence[Summary], trials: Sequence[Trial], unit:
         worth = unit.format(best.value.mean)
         if not math.isinf(best.value.upper):
             worth += f" (95 % {unit.interval([best.value.lower, best.value.upper])})"
-        best_of = f"In {place}, {best.method} is best of {several(len(own), 'method')} with {worth}"
+        best_of = f"In {place}, {_say(best.method)} is best of {several(len(own), 'method')} with {worth}"
         if best.method == first or all(summary.method != first for summary in own):
             sentences.append(f"{best_of}.")
             sure = False
             continue
         apart = differences(trials, Cell(*best[:4]), first, attrgetter("value"))
-        sentences.append(name_difference(f"{best_of}; {best.method} minus {first}", apart, unit))
+        sentences.append(name_difference(f"{best_of}; {_say(best.method)} minus {_say(first)}", apart, unit))
         sure = sure and is_significant(apart)
     more = CHOSEN if len({summary.method for summary in results}) > 2 else ()
     return Answer(QUESTION, sentences[0], sure, [*sentences[1:], *more])

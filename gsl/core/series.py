@@ -5,12 +5,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 SAME = 1e-6  # stamps that differ by less are one: as numbers, seconds since 1970 are told to 2e-7 [s]
 FINEST = 400  # points of a signal's grid a second, when lags are measured
 COARSE = 50  # where it only counts whether there is one
 EVEN = 1e-3  # of a step, by which the mean and the median of an even clock differ at most
 POINTS = 60_000  # of a grid at most
+CUBIC = 4  # rows that a cubic spline takes
 
 
 class Lag(NamedTuple):
@@ -40,8 +42,17 @@ def hold(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def interpolate(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Return linear interpolations of values of shape (T, k) at some times, shape (N, k); constant beyond the ends."""
-    return np.column_stack([np.interp(at, stamps, column) for column in values.T])
+    """Return values of shape (T, k) at other times, shape (N, k), by a cubic spline; constant beyond the ends.
+
+    Chords would cut the tops of fast motions, by 2 mrad at 100 rad/s² and 50 rows a second with a jittering clock. They
+    are left where no spline goes through: few rows, stamps that come twice, values that are not finite.
+    """
+    smooth = len(stamps) >= CUBIC and bool((np.diff(stamps) > 0.0).all())
+    inside = np.clip(at, stamps[0], stamps[-1])
+    return np.column_stack([
+        CubicSpline(stamps, column)(inside) if smooth and np.isfinite(column).all() else np.interp(at, stamps, column)
+        for column in values.T
+    ])  # fmt: skip
 
 
 def pieces(stamps: np.ndarray, longest: float) -> list[slice]:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.trajectory import Batch, Trajectory
+from gsl.export.omissions import REWARD, TIME, VELOCITY, list_omissions
 
 VERSION = "v3.0"
 DEGREES = 180.0 / np.pi
@@ -78,7 +79,7 @@ def write_lerobot(folder: Path, batch: Batch, task: str) -> list[str]:
         "meta/episodes/file_index": [0] * len(lengths),
     }
     _write(folder / _EPISODES, pa.table(episodes), pq)
-    return _list_omissions(batch)
+    return list_omissions(batch, TIME, VELOCITY, REWARD, "robot")
 
 
 def _vectors(batch: Batch) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -128,16 +129,6 @@ def _tasks(task: str) -> Any:
     import pyarrow as pa
 
     return pa.Table.from_pandas(pd.DataFrame({"task_index": [0]}, index=pd.Index([task], name="task")))
-
-
-def _list_omissions(batch: Batch) -> list[str]:
-    sensors = sorted({name for episode in batch.episodes for name in episode.sensors})
-    lines = ["the state after the last action of an episode"]
-    if sensors:
-        lines.append(f"sensors: {', '.join(sensors)}")
-    if any(episode.grounded_action is not None for episode in batch.episodes):
-        lines.append("what a grounding sent instead of an action")
-    return lines
 
 
 def _write(path: Path, table: Any, pq: Any) -> None:

@@ -14,11 +14,13 @@ import numpy as np
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ConfigError, InputError
 from gsl.export.lerobot import write_lerobot
+from gsl.export.omissions import FELL, GROUNDED, LAST, REWARD, SENSORS, TIME, VELOCITY, list_omissions
 from gsl.storage.trajectory_columns import columns_of
 
 NANOSECONDS = 1e9
 MOST_SECONDS = 2**31 - 1  # of a stamp of ROS 2
 _ROOT = "MINARI_DATASETS_PATH"
+_ALL = (LAST, TIME, VELOCITY, GROUNDED, REWARD, FELL, SENSORS)
 PAUSE = 1.0  # between two episodes of a recording that has one clock [s]
 
 
@@ -27,7 +29,7 @@ def write_csv(folder: Path, batch: Batch, task: str) -> list[str]:
     import pandas as pd
 
     pd.DataFrame(columns_of(folder, batch)).to_csv(folder / "trajectories.csv", index=False)
-    return ["metadata: robot, world, policy, units"]
+    return list_omissions(batch, *_ALL)
 
 
 def write_mcap(folder: Path, batch: Batch, task: str) -> list[str]:
@@ -64,7 +66,7 @@ def write_mcap(folder: Path, batch: Batch, task: str) -> list[str]:
                 bag.write(topics[0], *message(seconds, episode.position[k], episode.velocity[k]))
                 if k < len(episode):
                     bag.write(topics[1], *message(seconds, episode.action[k], nothing))
-    return _beside_joints(batch)
+    return list_omissions(batch, LAST, TIME, VELOCITY)
 
 
 def write_minari(folder: Path, batch: Batch, task: str) -> list[str]:
@@ -85,7 +87,7 @@ def write_minari(folder: Path, batch: Batch, task: str) -> list[str]:
             action_space=Box(-np.inf, np.inf, (len(batch.joints),), dtype=np.float64),
             algorithm_name=task, description=f"joints: {', '.join(batch.joints)}",
         )  # fmt: skip
-    return _beside_joints(batch)
+    return list_omissions(batch, LAST, VELOCITY, REWARD, FELL, "terminated")
 
 
 def _buffer(kind: Any, number: int, episode: Trajectory) -> Any:
@@ -141,11 +143,12 @@ def write_rerun(folder: Path, batch: Batch, task: str) -> list[str]:
         start += float(episode.time[-1]) + PAUSE
     recording.flush()
     recording.disconnect()
-    return []
+    return list_omissions(batch, *_ALL)
 
 
 def _series(batch: Batch, episode: Trajectory) -> dict[str, np.ndarray]:
     joints = {"action": episode.action, "position": episode.position, "velocity": episode.velocity}
+    joints |= {} if episode.grounded_action is None else {"grounded_action": episode.grounded_action}
     series = {
         f"{part}/{joint}": values[:, k]
         for part, values in joints.items()
@@ -154,17 +157,13 @@ def _series(batch: Batch, episode: Trajectory) -> dict[str, np.ndarray]:
     }
     if episode.state is not None:
         series |= {f"state/{k}": column for k, column in enumerate(episode.state.T)}
-    return series | {name: np.asarray(values, dtype=float) for name, values in episode.sensors.items()}
+    beside = {"reward": episode.reward, "fell": episode.fell, **episode.sensors}
+    return series | {name: np.asarray(values, dtype=float) for name, values in beside.items() if values is not None}
 
 
 def _need_joints(batch: Batch) -> None:
     if batch.states:
         raise ConfigError("format", "is for joints; these trajectories are of an environment's state")
-
-
-def _beside_joints(batch: Batch) -> list[str]:
-    sensors = sorted({name for episode in batch.episodes for name in episode.sensors} - {"terminated"})
-    return [f"sensors: {', '.join(sensors)}"] if sensors else []
 
 
 WRITERS: Mapping[str, Callable[[Path, Batch, str], list[str]]] = {

@@ -108,8 +108,14 @@ def _train_inverse(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Tabl
 
 
 def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
-    groups = {"all": metrics, **metrics["groups"]}
-    rows = [
+    below = f"what it has learned: {folder.as_posix()}/servo.png"
+    return Table("distance from held-out motions [noise floors]", *servo_table(metrics), below)
+
+
+def servo_table(metrics: Mapping[str, Any]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """Return titles and rows of what a learned servo leaves [noise floors], by group of joints."""
+    groups: Mapping[str, Mapping[str, Any]] = {"all": metrics, **metrics["groups"]}
+    rows: list[tuple[str, ...]] = [
         (
             name,
             f"{figures['floors_before']:.2f}",
@@ -118,9 +124,7 @@ def _train_servo(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
         )
         for name, figures in groups.items()
     ]
-    titles = ("joints", "simulator", "with the learned servo", "learned")
-    below = f"what it has learned: {folder.as_posix()}/servo.png"
-    return Table("distance from held-out motions [noise floors]", titles, rows, below)
+    return ("joints", "simulator", "with the learned servo", "learned"), rows
 
 
 def _optimize(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:

@@ -58,7 +58,7 @@ class Curve(NamedTuple):
 
 
 def line_chart(
-    curves: Sequence[Curve], *, x: str, y: str, zero: bool = False, mark: float | None = None
+    curves: Sequence[Curve], *, x: str, y: str, zero: bool = False, mark: float | None = None, counted: bool = False
 ) -> Markup | None:
     """Return curves over a common axis with a legend.
 
@@ -68,6 +68,7 @@ def line_chart(
         y: Of the vertical one.
         zero: Whether the vertical axis begins at 0.
         mark: Height of a thin line across.
+        counted: Whether the horizontal axis counts, so that only whole numbers stand below it.
     """
     drawn = [(curve, points) for curve in curves if (points := curve.points) if not np.isnan(points).all()]
     if not drawn:
@@ -82,6 +83,7 @@ def line_chart(
             axes.axhline(mark, color=INK, linewidth=1.0, linestyle=(0, (4, 3)))
         axes.set_ylim(bottom=0.0 if zero else None)
         axes.margins(x=0.0)
+        axes.locator_params(axis="x", integer=counted)
         _name(axes, x, y)
         names = [name for name in reversed(labels) if name]
         whole.legend(

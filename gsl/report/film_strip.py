@@ -125,7 +125,8 @@ class Strip:
         for (x, y), along in zip(self._ruler, self._scene.marks[:, 0] - self._scene.start, strict=True):
             draw.line([(x, y), (x, y + 6)], fill=INK, width=1)
             if 2 * LETTERS < x < self._scene.width - 2 * LETTERS:
-                draw.text((x, y + 8), f"{along:g}", fill=INK, font=_font(), anchor="ma")
+                unit = " m" if abs(along) < 1e-9 else ""  # once, at the start
+                draw.text((x, y + 8), f"{along:g}{unit}", fill=INK, font=_font(), anchor="ma")
 
 
 def compose(strips: Sequence[np.ndarray], scene: Scene, traces: np.ndarray) -> np.ndarray:

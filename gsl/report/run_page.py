@@ -19,7 +19,7 @@ from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.origin import Origin, origin
 
 MARKS = {"good": "✓", "doubt": "?"}
-LONG = 12  # rows of a lineage that are shown at once
+LONG = 12  # rows of a table that are shown at once
 _NOTHING = Markup("")
 PARAMETERS = 40  # of a policy that are listed, the most changed first
 
@@ -60,11 +60,16 @@ def describe_gain(
     """
     low = gain["interval"][0]
     sure = low is not None and low > 0.0
-    reached = f"{unit.format(after['value'])}{_bound(unit, after['interval'])}"
+    reached = describe_value(unit, after["value"], after["interval"])
     more = f"{unit.format(gain['value'], sign=True)}{_bound(unit, gain['interval'], sign=True)}"
     significant = f"the gain over {over}, {more}, is {'' if sure else 'not '}significant"
     start = unit.bare(before["value"])
     return f"{name} reaches {reached} on the real side, π0 {start}: {significant}.", sure
+
+
+def describe_value(unit: Unit, value: float, interval: list[float | None]) -> str:
+    """Return a value with its unit and its 95 % interval, if that has ends."""
+    return f"{unit.format(value)}{_bound(unit, interval)}"
 
 
 def _bound(unit: Unit, interval: list[float | None], *, sign: bool = False) -> str:
@@ -118,14 +123,15 @@ def describe_origin(how: Origin | None) -> list[Part]:
     return [
         section(
             "Lineage",
-            _fold_long(table(("role", "where", "contents"), rows), len(rows)) if rows else None,
+            fold_long(table(("role", "where", "contents"), rows), len(rows)) if rows else None,
             note="Where it lies, as seen from this page. gsl lineage and gsl verify follow it to the first log.",
         ),
         section("How to repeat it", again, settings),
     ]
 
 
-def _fold_long(shown: Markup, rows: int) -> Markup:
+def fold_long(shown: Markup, rows: int) -> Markup:
+    """Return a table of so many rows, folded up where they are many."""
     return shown if rows <= LONG else fold(f"all {rows}", shown)
 
 

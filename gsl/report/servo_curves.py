@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from gsl.core.plant import Plant
 from gsl.models.servo import ServoModel
-from gsl.report.style import GROUNDED, SIMULATION, figure, headline, look, save
+from gsl.report.style import GROUNDED, SIMULATION, WIDTH, figure, headline, look, save
 from gsl.worlds.held import Held
 
 if TYPE_CHECKING:
@@ -29,15 +30,39 @@ def servo_curves(path: Path, plant: Plant, model: ServoModel, step: float, perio
         step: Physics period [s].
         period: Control period [s].
     """
-    save(servo_curves_figure(plant, model, step, period), path)
+    title = "What the servo has learned: how a joint answers a step, and what constant speed costs"
+    save(servo_curves_figure(plant, model, step, period, list_groups(plant, model), title=title), path)
 
 
-def servo_curves_figure(plant: Plant, model: ServoModel, step: float, period: float) -> Figure:
-    """Return the figure; arguments as those of `servo_curves`."""
-    groups = [g for g in range(len(model.groups)) if (_members(model, plant) == g).any()]
+def list_groups(plant: Plant, model: ServoModel) -> list[int]:
+    """Return the groups, by number, that have a joint of their own."""
+    return [g for g in range(len(model.groups)) if (_members(model, plant) == g).any()]
+
+
+def servo_curves_figure(
+    plant: Plant,
+    model: ServoModel,
+    step: float,
+    period: float,
+    groups: Sequence[int],
+    *,
+    title: str = "",
+    width: float = WIDTH,
+) -> Figure:
+    """Return the figure.
+
+    Args:
+        plant: The servo that it stands on.
+        model: What was learned.
+        step: Physics period [s].
+        period: Control period [s].
+        groups: By number, a column each.
+        title: What there is to see.
+        width: Of the figure [in].
+    """
     plants = (("simulator", plant, SIMULATION), ("learned servo", model.on(plant), GROUNDED))
     with look():
-        whole = figure(5.2)
+        whole = figure(5.2, width)
         axes = whole.subplots(2, len(groups), squeeze=False)
         for column, g in enumerate(groups):
             joint = int(np.argmax(_members(model, plant) == g))
@@ -52,7 +77,7 @@ def servo_curves_figure(plant: Plant, model: ServoModel, step: float, period: fl
         axes[0, 0].set_ylabel("answer [°]")
         axes[1, 0].set_ylabel("torque at that speed [N·m]")
         axes[0, 0].legend(frameon=False)
-        headline(whole, "What the servo has learned: how a joint answers a step, and what constant speed costs")
+        headline(whole, title)
     return whole
 
 

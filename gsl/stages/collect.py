@@ -15,16 +15,20 @@ from gsl.core.interfaces import SIM, Policy, Task, World
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
+from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.random_choice import exploration
 from gsl.policies.policy import neighbour, size
 from gsl.policies.programme import Piece, Programmed
 from gsl.real_robot.errand import Errand, Order, answer_parents, ask
+from gsl.report.collection_page import write_collection_page
 from gsl.rollout.parallel import Job, Workers, trajectories
 from gsl.rollout.programme import command_file, playing
 from gsl.rollout.rollout import Scenario
 from gsl.storage.policy_choice import PolicyChoice
 from gsl.storage.trajectories import write
+from gsl.validation.iteration_pictures import read_footfalls
+from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot
 
 FILE = "trajectories.parquet"
@@ -87,7 +91,9 @@ class Collect:
                 {"policy": piece.label, "parameters": piece.parameters.tolist(), **piece.about} for piece in pieces
             ],
         }
-        write(folder / FILE, Batch(_alike(episodes), layout.joints, layout.control_period, about))
+        batch = Batch(_alike(episodes), layout.joints, layout.control_period, about)
+        write(folder / FILE, batch)
+        self._write_page(folder, batch, 0 if isinstance(policy, Programmed) else self.episodes)
         steps, own = sum(map(len, episodes)), [episode.value for episode in episodes[: self.episodes]]
         return {
             "episodes": len(pieces),
@@ -98,6 +104,12 @@ class Collect:
             "action_noise": self.action_noise,
             "value": None if isinstance(policy, Programmed) else float(np.mean(own)),
         }
+
+    def _write_page(self, folder: Path, batch: Batch, own: int) -> None:
+        slides = self.world.plant.robot.slides if isinstance(self.world, BulletWorld) else ()
+        walk = read_footfalls("the first episode", batch.episodes[0])
+        unit, noisy = Unit.of(self.task), bool(self.action_noise)
+        write_collection_page(folder, batch, own, unit, noisy=noisy, walk=walk, slides=slides)
 
     def _play(self, scenario: Scenario, pieces: Sequence[Piece], console: Console) -> list[Trajectory]:
         """Return the episodes, of a robot somewhere else from its answer."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from gsl.optimizers.candidates import check_candidates
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.optimizers.race import Race, Racing
 from gsl.policies.policy import size
+from gsl.report.iteration_page import read_check
+from gsl.report.run_page import Change
+from gsl.report.search_page import Winner, write_search_page
 from gsl.rollout.estimate import estimate
 from gsl.rollout.parallel import Job, Workers, episodes
 from gsl.rollout.rl_env import GroundedSimulator
@@ -38,13 +41,6 @@ from gsl.validation.gate import REPORT, Gate
 from gsl.validation.screening import Screening, foretells_falls, passing, screen
 
 BEST = "best_in_simulation.json"
-
-
-class Winner(NamedTuple):
-    """The best candidate of a generation, whose `value_sim` is a mean, and what the search maximises of it."""
-
-    policy: PolicyRecord
-    worth: float
 
 
 @component
@@ -101,21 +97,37 @@ class Optimize:
             winners = [*self._search(self.optimizer, scenario, first, GenerationLog(folder, console.status), console)]
         else:
             winners = [*self._learn(self.optimizer, scenario, first, console)]
-        searched = len(winners)
-        winners, screened = self._screen(bare, checked, winners, console)
-        thetas += [winner.policy for winner in winners]
+        kept, screened = self._screen(bare, checked, winners, console)
+        thetas += [winner.policy for winner in kept]
         write_policies(folder / FILE, policies(self.policy, self.task, thetas))
-        best, worth = max(reversed(winners), key=lambda winner: winner.worth)
+        chosen = max(reversed(kept), key=lambda winner: winner.worth)
+        best = chosen.policy
         write_policies(folder / BEST, policies(self.policy, self.task, [best]))
-        return {
-            "generations": searched,
+        metrics = {
+            "generations": len(winners),
             "best_value_sim": best.value_sim,
-            **({"best_cvar_sim": worth} if self.objective == CVAR else {}),
+            **({"best_cvar_sim": chosen.worth} if self.objective == CVAR else {}),
             **checked,
             **yielding,
             **screened,
             **self._drift(scenario, thetas, console),
         }
+        change = Change(
+            self.policy.names, first.tolist(), vector(self.policy, best).tolist(), self.policy.scale.tolist()
+        )
+        tried, check = [theta.name for theta in thetas], read_check(folder / REPORT)
+        write_search_page(
+            folder,
+            winners,
+            tried,
+            best,
+            metrics,
+            change,
+            Unit.of(self.task),
+            check=check,
+            spent=self._count_played(winners),
+        )
+        return metrics
 
     def _search(
         self, optimizer: Search, scenario: Scenario, first: np.ndarray, log: GenerationLog, console: Console
@@ -149,7 +161,7 @@ class Optimize:
                 )
                 highest = max(highest, generation.values[best])
                 progress.best(f"best {Unit.of(self.task).format(highest)} in simulation")
-                yield Winner(self._record(index, candidates[best], means[best]), generation.values[best])
+                yield Winner(self._record(index, candidates[best], means[best]), generation)
 
     def _learn(self, optimizer: Learner, scenario: Scenario, first: np.ndarray, console: Console) -> Iterator[Winner]:
         """Yield what a learner has come to after each generation."""
@@ -162,7 +174,17 @@ class Optimize:
                 done = self._evaluate(scenario, [parameters], index, progress)
                 value = done.values[0]
                 note_step("learner", index + 1, value=value, falls=done.falls[0])
-                yield Winner(self._record(index, parameters, value), value)
+                yield Winner(self._record(index, parameters, value), done)
+
+    def _count_played(self, winners: Sequence[Winner]) -> list[tuple[str, str]]:
+        """Return what was played in simulation, in words."""
+        done = [winner.generation for winner in winners]
+        played = sum(sum(step.played) if step.played else len(step.values) * self.rollouts for step in done)
+        taken = self.optimizer.steps_taken if isinstance(self.optimizer, Learner) else 0
+        return [
+            ("steps of learning in simulation", f"{taken:,}" if taken else ""),
+            ("episodes in simulation", f"{played:,}, {self.rollouts} of a candidate at most"),
+        ]
 
     def _screen(
         self, bare: Scenario, checked: Mapping[str, Any], winners: list[Winner], console: Console

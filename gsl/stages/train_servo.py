@@ -23,6 +23,7 @@ from gsl.models.servo import ServoModel, neutral
 from gsl.models.servo_file import FILE
 from gsl.models.servo_members import ServoMembers
 from gsl.report.servo_curves import servo_curves
+from gsl.report.servo_page import write_servo_page
 from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.models import write_model
@@ -96,7 +97,10 @@ class TrainServo:
         for line in remarks(metrics):
             console.status(f"warning: {line}")
         noise = dict(zip(model.joints, model.noise.tolist(), strict=True))
-        return {**metrics, "torque_noise": noise, "problems": problems(metrics)}
+        metrics |= {"torque_noise": noise, "problems": problems(metrics)}
+        way = [progress.level for progress in learned.way]
+        write_servo_page(folder, metrics, model, self.sim.plant, exp.period, way, spent=_count_real(exp, learned))
+        return metrics
 
     def _walks(self, exp: Log) -> Walks | None:
         """Return the log on the ground, if there is one.
@@ -132,3 +136,15 @@ class TrainServo:
         gap = f"held out, {learned.before['all']:.2f} noise floors became {learned.after['all']:.2f}"
         (folder / WORLD).parent.mkdir()
         (folder / WORLD).write_text(f"# The simulator with a learned servo: {gap}.\n{text}", encoding="utf-8")
+
+
+def _count_real(exp: Log, learned: LearnedServo) -> list[tuple[str, str]]:
+    """Return what real data the servo was learned from, in words."""
+    seconds = exp.period * sum(len(record.targets) for record in exp.records)
+    fitted, judged, tested = learned.windows
+    return [
+        ("motions in the air", f"{len(exp.records)}, {seconds:.0f} s"),
+        ("windows to fit", str(fitted)),
+        ("windows to stop by", str(judged)),
+        ("windows to check by", str(tested)),
+    ]

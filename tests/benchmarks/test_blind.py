@@ -281,7 +281,7 @@ def test_a_jittering_clock_moves_readings_and_not_the_commands() -> None:
     path = np.sin(2.0 * times)[:, None]
     read = [log_readings(times, path, share * PERIOD, 0.0, np.random.default_rng(0)) for share in (0.0, 0.3)]
     assert np.array_equal(read[0], path)
-    assert 1e-5 < np.abs(read[1] - path).max() < 2e-3  # an import puts stamps on rows: what is left is curvature
+    assert 0.0 < np.abs(read[1] - path)[4:-4].max() < 1e-5  # an import puts stamps on rows
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ import pytest
 from gsl.core.unit import Unit
 from gsl.tasks.own_reward import OwnReward
 from gsl.tasks.walk import Walk
+from gsl_experiments.answer import answer_comparison
 from gsl_experiments.comparison import differences, orders, summaries
 from gsl_experiments.comparison_table import markdown
 from gsl_experiments.paper_cells import every_trial, one_by_one, worth
@@ -64,6 +65,16 @@ def test_real_episodes_of_models_are_counted_and_refusals_told() -> None:
 def test_differences_are_paired_by_trial() -> None:
     difference = differences(TRIALS, Cell("", "nao_worn", "gat", 1), "none")
     assert difference.mean == pytest.approx((20.0 - 0.0 + 10.0 + 5.0) / 2)
+
+
+def test_a_sentence_says_which_search_is_the_best_and_none_is_no_name() -> None:
+    unit = Unit(100.0, "cm/s")
+    sentence = answer_comparison(summaries(TRIALS), TRIALS, unit).sentence
+    assert sentence.startswith("In nao_worn, gat is best of 2 methods with 28.7 cm/s (95 % ")
+    assert "; gat minus the search without grounding: +4.4 cm/s (95 % " in sentence  # 0.25 · (0.2 + 0.15) / 2
+    losses = [*TRIALS[:2], _trial("gat", 1, -0.2, 4), _trial("gat", 2, -0.1, 2)]
+    answer = answer_comparison(summaries(losses), losses, unit)
+    assert answer.sentence.startswith("In nao_worn, the search without grounding is best of 2 methods with 24.4 cm/s")
 
 
 def test_winners_are_counted_over_all_trials() -> None:

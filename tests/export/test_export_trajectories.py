@@ -22,12 +22,17 @@ def episode(length: int, phase: float) -> Trajectory:
     time = PERIOD * np.arange(length + 1)
     position = np.sin(time[:, None] + phase + np.arange(len(JOINTS)))
     action = position[:-1] + 0.1 * np.cos(3.0 * time[:-1, None])
-    return Trajectory(time, action, position, np.cos(time[:, None] + phase + np.arange(len(JOINTS))))
+    velocity = np.cos(time[:, None] + phase + np.arange(len(JOINTS)))
+    return Trajectory(
+        time, action, position, velocity, grounded_action=action + 0.01, reward=time[1:], fell=time > 2.0,
+        sensors={"voltage": 12.0 + time},
+    )  # fmt: skip
 
 
 @pytest.fixture
 def batch(tmp_path: Path) -> Batch:
-    kept = Batch((episode(40, 0.0), episode(55, 0.7)), JOINTS, PERIOD, {"robot": "so100", "role": "imported"})
+    about = {"robot": "so100", "role": "imported", "episodes": [{"motion": "sine", "gain": 3}, {"motion": "step"}]}
+    kept = Batch((episode(40, 0.0), episode(55, 0.7)), JOINTS, PERIOD, about)
     write(tmp_path / "log.parquet", kept)
     return kept
 
@@ -43,6 +48,7 @@ def check_alike(again: Batch, batch: Batch, *, rows: int, precision: float) -> N
         n = len(other) - (1 - rows)
         np.testing.assert_allclose(episode.position[:n], other.position[:n], atol=precision)
         np.testing.assert_allclose(episode.action[: n - 1], other.action[: n - 1], atol=precision)
+        np.testing.assert_allclose(episode.velocity[:n], other.velocity[:n], atol=precision)
 
 
 def test_a_lerobot_data_set_is_imported_again(batch: Batch, tmp_path: Path) -> None:
@@ -95,7 +101,40 @@ def test_minari_loads_its_data_set(batch: Batch, tmp_path: Path, monkeypatch: py
     for stored, episode in zip(data, batch.episodes, strict=True):
         np.testing.assert_array_equal(stored.observations, np.hstack([episode.position, episode.velocity]))
         np.testing.assert_array_equal(stored.actions, episode.action)
-        assert stored.truncations[-1] and not stored.terminations.any()
+        np.testing.assert_array_equal(stored.rewards, episode.reward)
+        assert stored.terminations[-1] == episode.ended_in_a_fall == (not stored.truncations[-1])
+
+
+SOME = [
+    "the state after the last action of an episode",
+    "when each row was measured",
+    "what a grounding sent instead of an action",
+    "rewards",
+    "since when the robot lies on the ground",
+    "sensors: voltage",
+]  # velocities are held by every format
+
+
+@pytest.mark.parametrize(
+    ("kind", "held", "library"),
+    [
+        ("lerobot", ("when", "rewards"), "pyarrow"),
+        ("csv", ("the state", "when", "what", "rewards", "since", "sensors"), "pandas"),
+        ("mcap", ("the state", "when"), "rosbags"),
+        ("minari", ("the state", "rewards", "since"), "minari"),
+        ("rerun", ("the state", "when", "what", "rewards", "since", "sensors"), "rerun"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore")
+def test_whatever_a_format_cannot_hold_is_said(
+    kind: str, held: tuple[str, ...], library: str, batch: Batch, tmp_path: Path
+) -> None:
+    pytest.importorskip(library)
+    said = (export(tmp_path, kind) / "not_held.txt").read_text("utf-8").splitlines()
+    lost = [line for line in SOME if not line.startswith(held)]
+    assert said[: len(lost)] == lost and said[len(lost)] == "labels of the episodes: gain, motion"
+    (metadata,) = said[len(lost) + 1 :]
+    assert metadata.startswith("metadata: ") and ("robot" in metadata) == (kind != "lerobot")
 
 
 def test_rerun_writes_a_recording(batch: Batch, tmp_path: Path) -> None:

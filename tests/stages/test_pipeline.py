@@ -170,6 +170,20 @@ def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[
     check_seen(run / "iterate/report.html", f"{100.0 * metrics['returned']['value']:.1f}")
 
 
+def test_a_search_and_what_was_collected_have_pages_with_the_figures_of_their_results(chain: Path) -> None:
+    run = chain / "runs/chain"
+    best, own = (
+        json.loads((run / stage / "metrics.json").read_text())[key]
+        for stage, key in (("optimize", "best_value_sim"), ("collect_real", "value"))
+    )
+    shown = {"optimize": f"reaches {100.0 * best:.1f} cm/s in simulation", "collect_real": f"{100.0 * own:.1f} cm/s"}
+    for stage, figure in shown.items():
+        page = run / stage / "report.html"
+        check_alone(page.read_text("utf-8"))
+        check_seen(page, figure, f"gsl {stage.partition('_')[0]}", "Real data")
+        assert done("open", f"chain/{stage}", folder=chain).out == f"runs/chain/{stage}/report.html\n"
+
+
 def test_open_names_the_page_where_there_is_no_display_and_says_what_has_none(
     whole: tuple[Path, Said], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -180,8 +194,8 @@ def test_open_names_the_page_where_there_is_no_display_and_says_what_has_none(
         done("open", "whole/iteration_01/evaluate", folder=whole[0]).out
         == "runs/whole/iteration_01/evaluate/report.html\n"
     )
-    said = gsl("open", "whole/iteration_01/optimize", folder=whole[0])
-    assert said.code == 2 and "has no page: optimize writes none" in said.err
+    said = gsl("open", "whole/iteration_01/train_forward", folder=whole[0])
+    assert said.code == 2 and "has no page: train_forward writes none" in said.err
 
 
 def test_iterate_ends_with_its_table_on_stdout_and_tells_of_its_stages_on_stderr(whole: tuple[Path, Said]) -> None:

@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 import pytest
 import yaml
+from browser import check_seen
 from commands import SMALL, Said, done, refused
 
 from gsl.core.checkpoint import read_checkpoint
@@ -55,6 +56,13 @@ def test_iterate_learns_the_servo_by_itself_and_reports_the_gap(air: tuple[Path,
     assert sentence in said.out and sentence in (folder / "runs/air/iterate/table.md").read_text()
     parents = loaded(folder / FIRST / "optimize/manifest.json")["parents"]
     assert [parent["role"] for parent in parents] == ["grounding.servo"]
+
+
+def test_what_was_learned_has_a_page_with_the_figures_of_its_results(air: tuple[Path, Said]) -> None:
+    place = air[0] / FIRST / "train_servo"
+    metrics = loaded(place / "metrics.json")
+    gap = f"from {metrics['floors_before']:.1f} to {metrics['floors_after']:.2f} noise floors"
+    check_seen(place / "report.html", gap, "time after a step", "speed [rad/s]", "delay [ms]", "motions in the air")
 
 
 def test_a_motion_and_a_walk_are_drawn(air: tuple[Path, Said]) -> None:

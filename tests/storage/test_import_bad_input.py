@@ -330,7 +330,7 @@ SETTINGS = {
     ),
     "a role": (
         {"signals": {"action": {"file": "cmd", "column": "a"}, "position": "q"}},
-        "mapping.signals.action.file = cmd: is no topic of a bag",
+        "mapping.signals.action.file = cmd: goes with no file: say files={cmd: its name}",
     ),
     "joints twice": ({"joints": ["a", "a"]}, "mapping.joints = a, a: must be different names"),
     "a negative period": ({"period": -1}, "mapping.period = -1: must be at least 1e-06 (s)"),

@@ -271,6 +271,12 @@ def test_what_is_typed_wrongly_gets_the_command_that_was_meant(tmp_path: Path) -
     assert line.endswith("wave is a LeRobot data set, which says where its files are; leave it out")
     line = refused("import", "source=wave", "mapping=so101_arm", folder=tmp_path)
     assert line.endswith("wave is a LeRobot data set, which says where its files are; leave mapping= out")
+    for mapping, column in (("pace", "dof_pos"), ("unitree_go2", "motor_state[{joint}].q")):
+        line = refused("import", "source=wave", f"mapping={mapping}", "mapping.files=null", folder=tmp_path)
+        assert line == (
+            f"mapping.signals.position.column = {column}: is nothing of wave, a LeRobot data set; "
+            "it needs no mapping: leave mapping= out, or say observation.state[0]"
+        )
     line = refused("import", "source=wave", "mapping.joints=[shoulder_pam]", folder=tmp_path)
     assert "is no joint of the data set" in line and "shoulder_pan" in line
     line = refused("import", "source=wave", "mapping.calibration=arm.json", folder=tmp_path)

@@ -7,9 +7,11 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from gsl.core.body import lump
 from gsl.core.plant import Plant
+from gsl.core.series import interpolate
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.records import slope
 from gsl.effects.effect import TWINS
@@ -113,13 +115,12 @@ class Workshop:
 def log_readings(
     times: np.ndarray, path: np.ndarray, jitter: float, noise: float, rng: np.random.Generator
 ) -> np.ndarray:
-    """Return what a logger with noise [rad] and a jittering clock [s] has of a path, as an import puts it on rows."""
-    stamps = times + jitter * np.clip(rng.standard_normal(len(times)), -1.5, 1.5)  # stays in order up to 0.3 periods
-    read = np.stack([np.interp(stamps, times, column) for column in path.T], axis=1)
-    read += noise * rng.standard_normal(path.shape)
+    """Return what an import makes of a path whose logger has noise [rad] and a jittering clock [s], shape (T, k)."""
     if jitter <= 0.0:
-        return read
-    return np.stack([np.interp(times, stamps, column) for column in read.T], axis=1)
+        return path + noise * rng.standard_normal(path.shape)
+    stamps = times + jitter * np.clip(rng.standard_normal(len(times)), -1.5, 1.5)  # stays in order up to 0.3 periods
+    read = CubicSpline(times, path)(stamps) + noise * rng.standard_normal(path.shape)
+    return interpolate(stamps, read, times)
 
 
 def rng_of(secret: str, *parts: int | str) -> np.random.Generator:

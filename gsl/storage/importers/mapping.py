@@ -155,7 +155,8 @@ class Mapping:
             if file not in self.files:
                 raise ConfigError(where, f"must be one of {', '.join(self.files)}", given=file or "(none)")
         elif file and not file.startswith("/"):
-            raise ConfigError(where, "is no topic of a bag, and `files` names no such role", given=file)
+            problem = f"goes with no file: say files={{{file}: its name}}, or leave `file` out where there is one file"
+            raise ConfigError(where, problem, given=file)
 
 
 def _check_effects(where: str, effects: dict[str, Any]) -> None:

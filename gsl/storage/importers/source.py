@@ -9,7 +9,7 @@ from typing import NamedTuple
 from gsl.errors import ConfigError, InputError
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, places
-from gsl.storage.lerobot.dataset import INFO, find_data_set, is_data_set, open_data_set
+from gsl.storage.lerobot.dataset import INFO, STATE, DataSet, find_data_set, is_data_set, open_data_set
 from gsl.storage.lerobot.own_mapping import own_mapping
 
 PLAIN = "position.{joint}"  # where positions are in files in our own words, and so in none of LeRobot's
@@ -50,6 +50,8 @@ def look_at(source: str, mapping: LogMapping, memory: float) -> Source:
         notes: list[str] = []
         if mapping.signals["position"].column == PLAIN:
             mapping, notes = own_mapping(data, mapping, memory)
+        else:
+            _check_fitting(source, mapping, data)
         name = folder.resolve().name
         return Source(
             [Place(f"{name}/{episode.name}", {"": episode.file}, episode) for episode in data.episodes], mapping, notes
@@ -74,6 +76,17 @@ def list_files(source: str, mapping: LogMapping, memory: float) -> Mapping[str, 
         for name, path in paths.items()
         for file in ([path] if path.is_file() else sorted(file for file in path.iterdir() if file.is_file()))
     }
+
+
+def _check_fitting(source: str, mapping: LogMapping, data: DataSet) -> None:
+    """Refuse a mapping that is for another kind of log."""
+    column = mapping.signals["position"].column
+    columns = [str(name) for name in (column.values() if isinstance(column, dict) else [column])]
+    if not any(name.startswith(tuple(data.widths)) for name in columns):
+        problem = (
+            f"is nothing of {source}, a LeRobot data set; it needs no mapping: leave mapping= out, or say {STATE}[0]"
+        )
+        raise ConfigError("mapping.signals.position.column", problem, given=columns[0])
 
 
 def _check_plain(source: str, mapping: LogMapping) -> None:

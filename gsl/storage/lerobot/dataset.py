@@ -18,6 +18,7 @@ from gsl.storage.parquet import count_bytes
 
 INFO = "meta/info.json"
 STATE, ACTION = "observation.state", "action"
+VELOCITY = "observation.velocity"  # of gsl's own data sets: LeRobot's arms log none
 VERSIONS = ("v2.0", "v2.1", "v3.")
 BY_EPISODE = "data/chunk-{episode_chunk:03d}/episode_{episode_index:06d}.parquet"  # of version 2
 BY_FILE = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"  # of version 3

@@ -17,7 +17,7 @@ from gsl.storage.importers.joints import leave_out
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.signal import Signal, Time
 from gsl.storage.lerobot.arms import JAW_CLOSED, JAW_STROKE, OLD, OLD_ZEROS, OURS, bare, family, is_gripper, motor
-from gsl.storage.lerobot.dataset import ACTION, INFO, STATE, DataSet
+from gsl.storage.lerobot.dataset import ACTION, INFO, STATE, VELOCITY, DataSet
 from gsl.storage.lerobot.encoder_steps import STEP, find_range, on_degrees
 from gsl.storage.lerobot.episode_table import TIME, EpisodeTable
 
@@ -44,6 +44,9 @@ def own_mapping(data: DataSet, mapping: LogMapping, memory: float) -> tuple[LogM
     scales, why = _scales(data, mapping, arm, entries, memory)
     columns = [[_column(data, key, entry) for entry in entries.values()] for key in (ACTION, STATE)]
     signals = {name: _signal(entries, own, scales) for name, own in zip(("action", "position"), columns, strict=True)}
+    speeds = {joint: f"{VELOCITY}.{bare(entry)}.vel" for joint, entry in entries.items()}
+    if data.angles and {*speeds.values()} <= {f"{VELOCITY}.{name}" for name in data.names.get(VELOCITY, ())}:
+        signals["velocity"] = Signal(column=dict(speeds), unit="deg/s")
     joints = list(entries)
     own = dataclasses.replace(mapping, signals=signals, joints=joints, robot=arm or robot, time=Time(TIME, "s"))
     return own, [why, *notes]
