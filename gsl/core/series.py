@@ -13,6 +13,7 @@ COARSE = 50  # where it only counts whether there is one
 EVEN = 1e-3  # of a step, by which the mean and the median of an even clock differ at most
 POINTS = 60_000  # of a grid at most
 CUBIC = 4  # rows that a cubic spline takes
+HUGE = 1e12  # values beyond which a spline's coefficients may overflow
 
 
 class Lag(NamedTuple):
@@ -45,13 +46,14 @@ def interpolate(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.nd
     """Return values of shape (T, k) at other times, shape (N, k), by a cubic spline; constant beyond the ends.
 
     Chords would cut the tops of fast motions, by 2 mrad at 100 rad/s² and 50 rows a second with a jittering clock. They
-    are left where no spline goes through: few rows, stamps that come twice, values that are not finite.
+    are left where no spline goes through: few rows, stamps that come twice, values that are no numbers or absurd.
     """
-    smooth = len(stamps) >= CUBIC and bool((np.diff(stamps) > 0.0).all())
+    rising = len(stamps) >= CUBIC and bool((np.diff(stamps) > SAME).all()) and np.abs(stamps).max() < HUGE
+    smooth = rising and np.isfinite(values).all(axis=0) & (np.abs(values) < HUGE).all(axis=0)
     inside = np.clip(at, stamps[0], stamps[-1])
     return np.column_stack([
-        CubicSpline(stamps, column)(inside) if smooth and np.isfinite(column).all() else np.interp(at, stamps, column)
-        for column in values.T
+        CubicSpline(stamps, column)(inside) if spline else np.interp(at, stamps, column)
+        for column, spline in zip(values.T, np.broadcast_to(smooth, values.shape[1]), strict=True)
     ])  # fmt: skip
 
 
