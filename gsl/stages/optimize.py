@@ -125,7 +125,7 @@ class Optimize:
             change,
             Unit.of(self.task),
             check=check,
-            spent=self._count_played(winners),
+            spent=self._count_episodes(winners),
         )
         return metrics
 
@@ -176,7 +176,7 @@ class Optimize:
                 note_step("learner", index + 1, value=value, falls=done.falls[0])
                 yield Winner(self._record(index, parameters, value), done)
 
-    def _count_played(self, winners: Sequence[Winner]) -> list[tuple[str, str]]:
+    def _count_episodes(self, winners: Sequence[Winner]) -> list[tuple[str, str]]:
         """Return what was played in simulation, in words."""
         done = [winner.generation for winner in winners]
         played = sum(sum(step.played) if step.played else len(step.values) * self.rollouts for step in done)

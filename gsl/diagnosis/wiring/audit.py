@@ -152,7 +152,8 @@ def take_part(batch: Batch) -> Batch:
     most, rows = round(ENOUGH / batch.control_period), [len(episode) for episode in batch.episodes]
     count = max(FEWEST, int(len(rows) * most / max(sum(rows), 1)))
     chosen = [batch.episodes[k] for k in spread(np.arange(len(rows)), count)]
-    return replace(batch, episodes=tuple(_begin(episode, most // 2) for episode in chosen), metadata={})
+    made_by = {key: value for key, value in batch.metadata.items() if key == "world"}  # whose step a replay asks for
+    return replace(batch, episodes=tuple(_begin(episode, most // 2) for episode in chosen), metadata=made_by)
 
 
 def _begin(episode: Trajectory, rows: int) -> Trajectory:
