@@ -81,8 +81,8 @@ def _errors(*, loose: bool) -> Callable[[Mark], Iterable[float]]:
 
 
 _SHARES = {
-    "top-1, medium and strong": _Share(_single(MEDIUM, STRONG), lambda m: m.first),
-    "top-2, medium and strong": _Share(_single(MEDIUM, STRONG), lambda m: m.second),
+    "top-1, medium and strong": _Share(_single(MEDIUM, STRONG), lambda m: m.first, (0.90, 0.75)),
+    "top-2, medium and strong": _Share(_single(MEDIUM, STRONG), lambda m: m.second, (0.97, 0.90)),
     "top-1, twins taken as one": _Share(_single(MEDIUM, STRONG), lambda m: m.twin, (0.95, 0.90)),
     "top-1, weak": _Share(_single(WEAK), lambda m: m.first),
     "top-2, weak": _Share(_single(WEAK), lambda m: m.second),
@@ -90,7 +90,7 @@ _SHARES = {
     "top-1, strong": _Share(_single(STRONG), lambda m: m.first),
     "wrong name, weak": _Share(_single(WEAK), lambda m: bool(m.named) and not m.second, None, False),
     "two effects: both named": _Share(_kind(TWO), lambda m: m.both, (0.80, 0.80)),
-    "two effects: at least one": _Share(_kind(TWO), lambda m: m.some),
+    "two effects: at least one": _Share(_kind(TWO), lambda m: m.some, (0.95, 0.90)),
     "fault of one joint: right joint": _Share(_kind(JOINT), lambda m: bool(m.joint), (0.95, 0.90)),
     "fault of one joint: joint on the map": _Share(lambda m: m.mapped is not None, lambda m: bool(m.mapped)),
     "fault of one joint: top-1": _Share(_kind(JOINT), lambda m: m.first),

@@ -7,7 +7,7 @@ effects, and by MuJoCo in `rigid_mujoco`, which makes the logs; a test holds the
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -42,6 +42,10 @@ _ADDED = {  # effect: (its parameter, row)
 _FACTORS = {"servo_gain": (("kp", servo.KP), ("kd", servo.KD)), "torque_limit": (("factor", servo.LIMIT),)}
 
 
+Motion = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+"""What the encoders read without bias, from rows of servos and extras, their state, rest, commands and start."""
+
+
 def play_foreign(
     plant: Plant,
     effects: Mapping[str, Any],
@@ -49,21 +53,32 @@ def play_foreign(
     targets: Sequence[np.ndarray],
     starts: Sequence[np.ndarray],
     period: float,
+    *,
+    embodied: Callable[[Plant, np.ndarray, float], Motion] | None = None,
 ) -> list[np.ndarray]:
     """Return what the encoders tell before each command and after the last one [rad], shape (T + 1, n_motors) each.
 
-    The arguments are those of `same.play_same`.
+    The arguments are those of `same.play_same`. Then `embodied` makes what moves the bodies, from the plant, the
+    armature at its joints [kg·m²] and the control period [s]; the chain model by default.
     """
     rows, bias, armature = build_rows(plant, effects)
-    tree = chain(embody(plant, effects), (1.0 - ON_ROTOR) * armature)
-    extras, state = extra_rows(plant, extra), np.zeros((2, len(armature)))
-    rest, paths = targets[0][0].copy(), []
-    for path, start in zip(targets, starts, strict=True):
+    move = (embodied or _in_the_chain)(embody(plant, effects), (1.0 - ON_ROTOR) * armature, period)
+    extras, state, rest = extra_rows(plant, extra), np.zeros((2, len(armature))), targets[0][0].copy()
+    pairs = zip(targets, starts, strict=True)
+    return [move(rows, extras, state, rest, np.ascontiguousarray(path), start) + bias for path, start in pairs]
+
+
+def _in_the_chain(plant: Plant, armature: np.ndarray, period: float) -> Motion:
+    tree = chain(plant, armature)
+
+    def move(
+        rows: np.ndarray, extras: np.ndarray, state: np.ndarray, rest: np.ndarray, path: np.ndarray, start: np.ndarray
+    ) -> np.ndarray:
         said = np.full((len(path) + 1, len(start)), np.nan)
-        motion = np.array([start, np.zeros_like(start)])
-        _play(rows, tree, extras, state, rest, np.ascontiguousarray(path), motion, period, said)
-        paths.append(said + bias)
-    return paths
+        _play(rows, tree, extras, state, rest, path, np.array([start, np.zeros_like(start)]), period, said)
+        return said
+
+    return move
 
 
 def build_rows(plant: Plant, effects: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
