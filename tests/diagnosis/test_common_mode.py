@@ -8,9 +8,11 @@ from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.common_mode import hand_over, shares
+from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Nominal
+from gsl.diagnosis.search.screening import extend
 from gsl.diagnosis.search.stepwise import Search
 from gsl.diagnosis.simulate.calibration import COULOMB, KD, no_shifts
 from gsl.effects.effect import apply_all, build
@@ -47,7 +49,9 @@ def test_no_more_is_handed_over_than_the_bounds_take() -> None:
     np.testing.assert_allclose(left[COULOMB], np.where(MASKS["arms"], 0.05, 0.1))
 
 
-def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
+@pytest.fixture(scope="module")
+def dry() -> Problem:
+    """Return the problem of a robot whose legs have more dry friction than its arms."""
     plant = nominal(NAO)
     effects = {"coulomb_friction": [{"torque": 0.2, "joints": "legs"}, {"torque": 0.1, "joints": "arms"}]}
     time = PERIOD * np.arange(150)
@@ -63,9 +67,24 @@ def test_friction_that_differs_between_legs_and_arms_is_told_apart() -> None:
     batch = Batch(
         episodes, NAO.controlled, PERIOD, {"episodes": [{"policy": str(k)} for k in range(4)], "world": {"step": 0.002}}
     )
-    problem = Nominal(plant, 0.002).problem(cut_log(batch, NAO), Options(threads=1), lambda phase: None)
+    return Nominal(plant, 0.002).problem(cut_log(batch, NAO), Options(threads=1), lambda phase: None)
+
+
+def test_friction_that_differs_between_legs_and_arms_is_told_apart(dry: Problem) -> None:
     friction = candidate("coulomb_friction", "torque")
-    everywhere = problem.fit((friction,), np.array([0.15]), no_shifts(15), every=1)
-    apart = Search(problem, problem.fit_calibration()).split(everywhere)
+    everywhere = dry.fit((friction,), np.array([0.15]), no_shifts(15), every=1)
+    apart = Search(dry, dry.fit_calibration()).split(everywhere)
     torques = {part.scope: float(value[0]) for part, value in zip(apart.candidates, apart.parameters, strict=True)}
     assert torques == pytest.approx({"legs": 0.2, "arms": 0.1}, rel=0.1)
+
+
+def test_a_search_without_an_effect_finds_what_it_would_find_anew(dry: Problem) -> None:
+    some = dry.only(("coulomb_friction", "viscous_friction", "load_friction"))
+    none = some.fit_calibration()
+    extend(some, none, 3)
+    again = some.without(("load_friction",))
+    fits, screening = extend(again, none, 3)
+    assert "load_friction" not in {lead.candidate.effect for lead in screening.leads}
+    anew, _ = extend(again.on(again.train, again.held_out), none, 3)
+    assert [fit.cost for fit in fits] == [fit.cost for fit in anew]
+    assert again.fit_calibration() is none

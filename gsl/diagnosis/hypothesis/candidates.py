@@ -64,6 +64,11 @@ class Candidate:
     seen: float | None = None
 
     @property
+    def key(self) -> tuple[str, str, tuple[str, ...]]:
+        """What tells it from the other candidates of a library."""
+        return self.effect, repr(self.fixed), self.free
+
+    @property
     def probes(self) -> np.ndarray:
         """Steps of the parameters that show what an effect in proportion does, shape (p,)."""
         return PROBE * (self.documented[1] - self.neutral)

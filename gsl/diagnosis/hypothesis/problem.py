@@ -42,6 +42,7 @@ class Problem:
         tick: Called with a phase when it begins, and with an empty word whenever some work is done.
         glances: Training windows that a screening looks at, spread over all of them; None for half of them.
         settings: Of the search and its fits.
+        memory: What came of fits and screenings: a search without some of the effects asks for most of them again.
     """
 
     train: Bench
@@ -51,6 +52,7 @@ class Problem:
     tick: Callable[[str], None]
     glances: int | None = None
     settings: SearchSettings = field(default_factory=SearchSettings)
+    memory: dict[tuple[Any, ...], Any] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
     def of(
@@ -97,6 +99,10 @@ class Problem:
         most = self.glances or (count // 2 if count > self.settings.few else count)
         return replace(self.train, pieces=self.train.pieces.take(spread(np.arange(count), most)))
 
+    def on(self, train: Bench, held_out: Bench) -> Problem:
+        """Return the same problem on other windows."""
+        return replace(self, train=train, held_out=held_out, memory={})
+
     def only(self, effects: Sequence[str]) -> Problem:
         """Return the problem with a part of the library."""
         return replace(self, library=tuple(part for part in self.library if part.effect in effects))
@@ -127,6 +133,20 @@ class Problem:
             every: Steps for which sensitivities to the shifts are kept.
             rounds: Steps at most.
         """
+        asked = (*(part.key for part in candidates), start.tobytes(), at.tobytes(), every, rounds)
+        if asked not in self.memory:
+            self.memory[asked] = self._fit(candidates, start, at, every, rounds)
+        fit: Hypothesis = self.memory[asked]
+        return fit
+
+    def _fit(
+        self,
+        candidates: tuple[Candidate, ...],
+        start: np.ndarray,
+        at: np.ndarray,
+        every: int | None,
+        rounds: int | None,
+    ) -> Hypothesis:
         sizes = np.cumsum([len(candidate.free) for candidate in candidates])[:-1]
 
         def split(values: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -45,6 +46,22 @@ class Screening:
 
     leads: tuple[Lead, ...]
     invisible: tuple[str, ...]
+
+
+class Answer(NamedTuple):
+    """What a candidate does to the residuals, at each point of its grid.
+
+    Attributes:
+        grid: Parameters, shape (g, p).
+        costs: Of each joint, shifts free, shape (g, n_joints).
+        shifts: These, shape (g, 7, n_joints).
+        trace: The strongest root mean square change of a joint's residuals [floors].
+    """
+
+    grid: np.ndarray
+    costs: np.ndarray
+    shifts: np.ndarray
+    trace: float
 
 
 @dataclass(frozen=True)
@@ -94,7 +111,8 @@ def screen(problem: Problem, base: Hypothesis) -> Screening:
     ground = Ground.of(problem.glance, base.effects)
     suspects = ground.suspects(problem.scopes, problem.settings)
     local = [part.on(joint) for joint in suspects for part in problem.library if part.on_joints]
-    return screen_candidates(ground, (*problem.library, *local), problem.scopes, problem.tick, problem.settings)
+    seen = problem.memory.setdefault(("screening", repr(base.effects)), {})
+    return screen_candidates(ground, (*problem.library, *local), problem.scopes, problem.tick, problem.settings, seen)
 
 
 def extend(problem: Problem, base: Hypothesis, width: int) -> tuple[list[Hypothesis], Screening]:
@@ -124,6 +142,7 @@ def screen_candidates(
     scopes: Mapping[str, np.ndarray],
     tick: Callable[[str], None],
     settings: SearchSettings,
+    seen: dict[Any, Answer] | None = None,
 ) -> Screening:
     """Try every candidate on top of what is switched on.
 
@@ -133,12 +152,15 @@ def screen_candidates(
         scopes: Names of scopes and their joints, each of shape (n_joints,).
         tick: Called with an empty word after each candidate.
         settings: What counts as invisible.
+        seen: Answers of candidates by their keys; new ones are put in.
     """
+    seen = {} if seen is None else seen
     leads: list[Lead] = []
     traces: dict[str, float] = {}
     for candidate in candidates:
-        grid = candidate.grid if len(candidate.grid) else _answer(ground, candidate)[None]
-        costs, shifts, trace = _costs(ground, candidate, grid)
+        if candidate.key not in seen:
+            seen[candidate.key] = _answer(ground, candidate)
+        grid, costs, shifts, trace = seen[candidate.key]
         traces[candidate.effect] = max(trace, traces.get(candidate.effect, 0.0))
         if trace > 0.0:
             leads += _leads(candidate, grid, costs, shifts, ground, scopes)
@@ -148,7 +170,7 @@ def screen_candidates(
     return Screening(tuple(leads), tuple(invisible))
 
 
-def _answer(ground: Ground, candidate: Candidate) -> np.ndarray:
+def _proportional(ground: Ground, candidate: Candidate) -> np.ndarray:
     """Return the best parameters of an effect in proportion to them, shape (p,)."""
     own, bench = [], ground.bench
     for k, probe in enumerate(candidate.probes):
@@ -161,9 +183,9 @@ def _answer(ground: Ground, candidate: Candidate) -> np.ndarray:
     return np.clip(candidate.neutral + change, *candidate.bounds)
 
 
-def _costs(ground: Ground, candidate: Candidate, grid: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return costs, shape (g, n_joints), shifts, shape (g, 7, n_joints), of each point; and the strongest trace."""
-    bench = ground.bench
+def _answer(ground: Ground, candidate: Candidate) -> Answer:
+    """Replay a candidate's grid."""
+    grid, bench = candidate.grid if len(candidate.grid) else _proportional(ground, candidate)[None], ground.bench
     costs, shifts = np.full((len(grid), bench.joints), np.inf), np.zeros((len(grid), *ground.shifts.shape))
     trace = 0.0
     for row in range(len(grid) - 1, -1, -1):  # the strongest first: without a trace of it there is none
@@ -172,7 +194,7 @@ def _costs(ground: Ground, candidate: Candidate, grid: np.ndarray) -> tuple[np.n
         if trace == 0.0:
             break
         shifts[row], costs[row] = fit_shifts(z, ground.slopes, ground.shifts, bench.simulator.spread)
-    return costs, shifts, trace
+    return Answer(grid, costs, shifts, trace)
 
 
 def _leads(
