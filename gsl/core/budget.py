@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -67,10 +68,16 @@ def check_file(path: Path, most: float = math.inf) -> None:
     about = path.stat()
     if stat.S_ISDIR(about.st_mode):
         raise IsADirectoryError(errno.EISDIR, "is a folder", str(path))
-    if not stat.S_ISREG(about.st_mode) or os.path.realpath(path).startswith(_KERNEL):
+    if not stat.S_ISREG(about.st_mode) or about.st_dev in _kernels() or os.path.realpath(path).startswith(_KERNEL):
         raise InputError(f"{path}: is no plain file")
     if about.st_size > most:
         raise InputError(f"{path}: has {about.st_size:,} bytes; {most:,.0f} are read at most")
+
+
+@cache
+def _kernels() -> frozenset[int]:
+    """Return the devices of the kernel's file systems, which can be mounted elsewhere as well."""
+    return frozenset(os.stat(place).st_dev for place in _KERNEL if os.path.ismount(place))
 
 
 def is_plain(path: Path) -> bool:

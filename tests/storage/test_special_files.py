@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from commands import SMALL, done, refused
+from commands import ENVIRONMENT, SMALL, done, refused
 
 from gsl.core.budget import check_file, is_plain
 from gsl.errors import GslError, InputError
@@ -45,6 +48,17 @@ def test_whatever_opens_files_refuses_it(kind: str, tmp_path: Path) -> None:
             read(path)
     with pytest.raises(GslError, match=f"{NO_FILE}|does not exist"):
         robot_of(path)
+
+
+def test_the_kernels_files_under_another_name(tmp_path: Path) -> None:
+    ask = "from gsl.core.budget import is_plain; from pathlib import Path; print(is_plain(Path('version')))"
+    mounted = f"mount --bind /proc {tmp_path} && cd {tmp_path} && "
+    line = ["unshare", "--map-root-user", "--mount", "sh", "-c"]
+    if not shutil.which("unshare") or subprocess.run([*line, f"{mounted} true"], check=False).returncode:
+        pytest.skip("no folder can be mounted here")
+    line += [f'{mounted} exec "$0" -c "$1"', sys.executable, ask]
+    ended = subprocess.run(line, env=ENVIRONMENT, capture_output=True, text=True, check=True)
+    assert ended.stdout == "False\n"
 
 
 @pytest.mark.parametrize("kind", KINDS)
