@@ -48,7 +48,7 @@ def _say(method: str) -> str:
 
 
 def answer_comparison(results: Sequence[Summary], trials: Sequence[Trial], unit: Unit) -> Answer:
-    """Return how the best method of each world stands to the first method, or what it is worth if that is the first.
+    """Return how the best method of each world stands to the first method, or to the next best if that is the first.
 
     Args:
         results: Of all trials.
@@ -65,12 +65,14 @@ def answer_comparison(results: Sequence[Summary], trials: Sequence[Trial], unit:
         if not math.isinf(best.value.upper):
             worth += f" (95 % {unit.interval([best.value.lower, best.value.upper])})"
         best_of = f"In {place}, {_say(best.method)} is best of {several(len(own), 'method')} with {worth}"
-        if best.method == first or all(summary.method != first for summary in own):
+        others = [summary for summary in own if summary.method != best.method]
+        if not others:
             sentences.append(f"{best_of}.")
             sure = False
             continue
-        apart = differences(trials, Cell(*best[:4]), first, attrgetter("value"))
-        sentences.append(name_difference(f"{best_of}; {_say(best.method)} minus {_say(first)}", apart, unit))
+        beside = max(others, key=lambda summary: (summary.method == first, summary.value.mean)).method
+        apart = differences(trials, Cell(*best[:4]), beside, attrgetter("value"))
+        sentences.append(name_difference(f"{best_of}; {_say(best.method)} minus {_say(beside)}", apart, unit))
         sure = sure and is_significant(apart)
     more = CHOSEN if len({summary.method for summary in results}) > 2 else ()
     return Answer(QUESTION, sentences[0], sure, [*sentences[1:], *more])

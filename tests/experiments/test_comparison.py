@@ -75,6 +75,7 @@ def test_a_sentence_says_which_search_is_the_best_and_none_is_no_name() -> None:
     losses = [*TRIALS[:2], _trial("gat", 1, -0.2, 4), _trial("gat", 2, -0.1, 2)]
     answer = answer_comparison(summaries(losses), losses, unit)
     assert answer.sentence.startswith("In nao_worn, the search without grounding is best of 2 methods with 24.4 cm/s")
+    assert "; the search without grounding minus gat: +3.1 cm/s (95 % " in answer.sentence  # 0.25 · (0.2 + 0.05) / 2
 
 
 def test_winners_are_counted_over_all_trials() -> None:
