@@ -21,7 +21,7 @@ def is_limit(key: str, value: float, *, slides: bool) -> bool:
 def is_range(limit: Mapping[str, float], *, slides: bool) -> bool:
     """Whether a range says where a joint can move."""
     far = BOUNDLESS[slides]
-    return -far < limit.get("lower", 0.0) < limit.get("upper", 0.0) < far
+    return {"lower", "upper"} <= set(limit) and -far < limit["lower"] < limit["upper"] < far
 
 
 def limits_problem(limit: Mapping[str, float], *, slides: bool) -> str:
@@ -34,8 +34,10 @@ def limits_problem(limit: Mapping[str, float], *, slides: bool) -> str:
         return f"has {' and '.join(lacks)}; {advice}"
     if is_range(limit, slides=slides):
         return ""
-    lower, upper, unit = limit.get("lower", 0.0), limit.get("upper", 0.0), "m" if slides else "rad"
-    has = f"its limits are {lower:g} and {upper:g} {unit}"
-    has += ", a placeholder" if lower < upper else ": it could not move"
-    has = has if {"lower", "upper"} & set(limit) else "has no range"
+    unit = "m" if slides else "rad"
+    if lacking := [key for key in ("lower", "upper") if key not in limit]:
+        has = "has no range" if len(lacking) == 2 else f"has no {lacking[0]}"
+    else:
+        has = f"its limits are {limit['lower']:g} and {limit['upper']:g} {unit}"
+        has += ", a placeholder" if limit["lower"] < limit["upper"] else ": it could not move"
     return f"{has}; write lower and upper [{unit}] in <limit>, or in a robot file (gsl init ... lower=... upper=...)"

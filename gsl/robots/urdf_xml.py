@@ -24,7 +24,8 @@ T = TypeVar("T")
 TURNING = ("revolute", "continuous")
 SLIDING = "prismatic"
 DRIVEN = (*TURNING, SLIDING)
-_LIMITS = ("lower", "upper", "effort", "velocity")
+ENDS = ("lower", "upper")
+_LIMITS = (*ENDS, "effort", "velocity")
 _SOFT = {"lower": "soft_lower_limit", "upper": "soft_upper_limit"}
 _LEFT = ("${", "$(")  # how an expression begins that xacro would have replaced
 FLOATING = "floating"
@@ -40,7 +41,7 @@ class Hinge:
         origin: Of the child's frame in the parent's [m], shape (3,).
         turn: From the child's axes to the parent's, shape (3, 3).
         axis: In the child's frame, of length 1, shape (3,).
-        limit: What <limit> says: lower, upper, effort, velocity.
+        limit: What <limit> says: lower and upper, both or neither, effort, velocity.
         soft: What <safety_controller> says of the range that commands keep: lower, upper [rad].
         follows: Joint, multiplier and offset [rad] of <mimic>, if there is one.
         dynamics: What <dynamics> says: damping [N·m·s/rad], friction [N·m].
@@ -203,6 +204,8 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
     limits = {
         key: read_number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None
     }
+    if {*ENDS} & set(limits):
+        limits = dict.fromkeys(ENDS, 0.0) | limits  # what the format says of one that is left out
     safety, follows = find_only(node, "safety_controller"), None
     soft = {
         key: read_number(safety, name, "<safety_controller>")

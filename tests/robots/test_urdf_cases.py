@@ -187,6 +187,20 @@ def test_limits_that_stand_for_none_are_placeholders(old: str, new: str, problem
     assert f"joints.j1: {problem}" in refused(*words, folder=tmp_path)
 
 
+@pytest.mark.parametrize(("said", "lower", "upper"), [("upper='1'", 0.0, 1.0), ("lower='-1'", -1.0, 0.0)])
+def test_an_end_of_a_range_that_is_left_out_is_0_as_in_the_format(
+    said: str, lower: float, upper: float, tmp_path: Path
+) -> None:
+    own = of(tmp_path, joint("j1", "a", LIMIT.replace("lower='-1' upper='1'", said)))
+    assert [(j.lower, j.upper) for j in own.joints if j.name == "j1"] == [(lower, upper)]
+
+
+def test_a_robot_file_says_both_ends_of_a_range(tmp_path: Path) -> None:
+    file = written(tmp_path, joint("j1", "a", LIMIT.replace("lower='-1' upper='1'", "")))
+    said = refused("init", f"urdf={file}", "name=one", "lower=-1", folder=tmp_path)
+    assert "joints.j1: has no upper; write lower and upper [rad] in <limit>" in said
+
+
 def test_a_continuous_joint_needs_no_range_and_believes_no_placeholder(tmp_path: Path) -> None:
     for ends in ("", "lower='0' upper='0'", "lower='-1e16' upper='1e16'"):
         body = of(tmp_path, joint("j1", "a", LIMIT.replace("lower='-1' upper='1'", ends), kind="continuous"))
