@@ -129,7 +129,7 @@ def missing(key: str) -> ConfigError:
 def _no_such_setting(key: str, words: Vocabulary) -> ConfigError:
     roles = [choice.partition("@")[2] for choice in words.chosen if choice.startswith(f"{key}@")]
     if roles:
-        return ConfigError(key, f"here a {key} has a role; say {' or '.join(f'{role}=...' for role in roles)}")
+        return ConfigError(key, f"has a role here; say {' or '.join(f'{role}=...' for role in roles)}")
     keys, last = list_keys(words.config), key.rpartition(".")[2]
     deeper = [declared for declared in keys if declared.rpartition(".")[2] == last]
     if deeper:

@@ -26,6 +26,7 @@ from gsl.core.compiling import count_compilation
 _HASH = hashlib.sha256().digest_size  # [bytes]
 _COMPILING = (b"compile_kernel", b"compile_inner")
 _IMPORT = re.compile(rb"^[ \t]*(?:from|import) (\w[\w.]*)(?: import (\([^)]*\)|[^\n]*))?", re.MULTILINE)
+_OF_LANES, _CHOICES = re.compile(r"\b(lanes|mask)\b"), ("bool", "truth")  # what numba calls an `if`
 F = TypeVar("F", bound=Callable[..., object])
 
 
@@ -71,6 +72,19 @@ def _compile(function: F, **more: bool) -> F:
         place = kept._impl
         kept._cache_file = _CheckedFiles(kept.cache_path, place.filename_base, place.locator.get_source_stamp())
     return dispatcher
+
+
+def describe_uncompilable(error: BaseException) -> str | None:
+    """Return where compiled code does what lanes (`gsl.core.lanes`) cannot and what to do, None of other errors."""
+    if not isinstance(error, numba.TypingError):
+        return None
+    call, place = re.search(r">>> (\w+)\((.*)\)", str(error)), re.search(r'File "(.+)", line (\d+):', str(error))
+    if not call or not place or not _OF_LANES.search(call[2]):
+        return None
+    where = f"{Path(place[1]).name}, line {place[2]}"
+    if call[1] in _CHOICES:
+        return f"{where}: the kernel computes several robots at once; choose by where(condition, yes, no), not by if"
+    return f"{where}: the kernel has no {call[1]} for several robots at once; see docs/howto/own-components.md"
 
 
 class _CheckedFiles(IndexDataCacheFile):

@@ -152,16 +152,43 @@ for _plain, _in_place, _name in (
 ):
     _define(_plain, lanes, 2, _operation(_name))
     _define(_in_place, lanes, 2, _operation(_name))
-for _compare, _sign in ((operator.gt, ">"), (operator.lt, "<"), (operator.eq, "==")):
+for _compare, _sign in (
+    (operator.gt, ">"),
+    (operator.ge, ">="),
+    (operator.lt, "<"),
+    (operator.le, "<="),
+    (operator.eq, "=="),
+):
     _define(_compare, mask, 2, _comparison(_sign))
 _define(operator.neg, lanes, 1, _operation("fneg"))
-_define(abs, lanes, 1, _find_call("fabs"))
+for _absolute in (abs, np.abs):
+    _define(_absolute, lanes, 1, _find_call("fabs"))
 _define(np.rint, lanes, 1, _find_call("rint"))
 _define(np.sqrt, lanes, 1, _find_call("sqrt"))
-for _function in (np.exp, np.log, np.sin, np.cos, np.tan, np.tanh, np.arctan):
+for _function in (np.sign, np.exp, np.log, np.sin, np.cos, np.tan, np.tanh, np.arctan):
     _define(_function, lanes, 1, _one_by_one(_function))
 _define(min, lanes, 2, _better("<"))
 _define(max, lanes, 2, _better(">"))
+
+
+@infer_global(operator.pow)
+class _Power(AbstractTemplate):
+    def generic(self, types_of: Any, named: Any) -> Any:
+        if len(types_of) != 2 or types_of[0] != lanes or not isinstance(types_of[1], types.IntegerLiteral):
+            return None
+        return signature(lanes, *types_of) if types_of[1].literal_value >= 0 else None
+
+
+@lower_builtin(operator.pow, lanes, types.IntegerLiteral)
+def _multiply(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+    """Multiply in the order in which numba does it with one number."""
+    result, square, left = ir.Constant(_VECTOR, [1.0] * LANES), values[0], kinds.args[1].literal_value
+    while left:
+        if left & 1:
+            result = builder.fmul(result, square)
+        left >>= 1
+        square = builder.fmul(square, square)
+    return result
 
 
 @infer_global(where)

@@ -119,6 +119,8 @@ def class_of(name: Any, where: str = "") -> Any:
         module = importlib.import_module(place)
     except (Exception, SystemExit) as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
+        if isinstance(error, ModuleNotFoundError) and error.name == place.partition(".")[0]:
+            reason = f"there is no module {error.name} in this folder or on Python's path"
         raise ConfigError(setting, f"cannot be loaded: {reason}", given=str(name)) from error
     target = getattr(module, attribute, None)
     if not isinstance(target, type):

@@ -10,7 +10,7 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from gsl.core.console import Console
-from gsl.core.interfaces import SIM
+from gsl.core.interfaces import REAL, SIM
 from gsl.core.region import region
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
@@ -66,16 +66,18 @@ class TrainForward:
         """Return the files of trajectories, or the artifacts, and the inverse model."""
         below = {} if self.residual_to is None else {"residual_to": resolve(self.residual_to, kind="train_inverse")}
         named = {"data": self.data, **{f"earlier_{n}": path for n, path in enumerate(self.earlier, start=1)}}
-        files = {name: data_file(reference) for name, reference in named.items()}
+        files = {name: data_file(reference, REAL) for name, reference in named.items()}
         if len({path.resolve() for path in files.values()}) < len(files):
             raise ConfigError("earlier", "names the same trajectories twice; what is held out would be learned from")
         return {name: path if path == Path(named[name]) else path.parent for name, path in files.items()} | below
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the model and the trajectories it has not seen."""
-        path = data_file(self.data)
+        path = data_file(self.data, REAL)
         newest = parts(path, other=SIM, share=self.heldout, seed=self.seed)
-        earlier = {file: earlier_batch(file, newest.training) for file in map(data_file, self.earlier)}
+        earlier = {
+            file: earlier_batch(file, newest.training) for file in [data_file(path, REAL) for path in self.earlier]
+        }
         data = aggregate(newest, list(earlier.values()))
         console.phase(f"fitting a forward model to {len(data.training)} trajectories")
         if data.training.states:

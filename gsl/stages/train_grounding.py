@@ -41,7 +41,9 @@ class TrainGrounding:
         check_own(self.grounding)
         for role in self.grounding.needs:
             if getattr(self, role) is None:
-                raise ConfigError(role, f"is missing; the grounding learns from {role} trajectories")
+                raise ConfigError(
+                    role, f"is missing; the grounding learns from {role} trajectories: a run of gsl collect"
+                )
 
     def parents(self) -> Mapping[str, Path]:
         """Return the files of trajectories, or the artifacts."""
@@ -50,7 +52,7 @@ class TrainGrounding:
             if (reference := getattr(self, role)) is not None:
                 named[role] = reference
         named |= {f"earlier_{n}": path for n, path in enumerate(self.earlier, start=1)}
-        files = {role: data_file(reference) for role, reference in named.items()}
+        files = {name: data_file(reference, SIM if name == SIM else REAL) for name, reference in named.items()}
         return {role: path if path == Path(named[role]) else path.parent for role, path in files.items()}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
@@ -58,8 +60,8 @@ class TrainGrounding:
         console.phase("the grounding learns")
         real, count = None, 0
         if self.real is not None:
-            newest = parts(data_file(self.real), other=SIM, share=self.heldout, seed=self.seed)
-            data = aggregate(newest, [earlier_batch(data_file(path), newest.training) for path in self.earlier])
+            newest = parts(data_file(self.real, REAL), other=SIM, share=self.heldout, seed=self.seed)
+            data = aggregate(newest, [earlier_batch(data_file(path, REAL), newest.training) for path in self.earlier])
             episodes = (*data.training.episodes, *data.validation.episodes)
             labels = [label for part in (data.training, data.validation) for label in part.metadata["episodes"]]
             real = replace(data.training, episodes=episodes, metadata={**data.training.metadata, "episodes": labels})
@@ -67,7 +69,7 @@ class TrainGrounding:
             falls = float(np.mean([episode.ended_in_a_fall for episode in own])) if own else 0.0
             write(folder / HELDOUT, replace(data.heldout, metadata={**data.heldout.metadata, FALLS: falls}))
             count = len(real)
-        sim = None if self.sim is None else read(data_file(self.sim))
+        sim = None if self.sim is None else read(data_file(self.sim, SIM))
         learned = self.grounding.learn(Evidence(real, sim), self.seed)
         arrays = _arrays(learned)
         name = f"{type(self.grounding).__module__}.{type(self.grounding).__qualname__}"

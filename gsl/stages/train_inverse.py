@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from gsl.core.console import Console
-from gsl.core.interfaces import REAL
+from gsl.core.interfaces import REAL, SIM
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.models.config import ModelConfig
@@ -38,14 +38,14 @@ class TrainInverse:
 
     def parents(self) -> Mapping[str, Path]:
         """Return the file of trajectories, or the artifact."""
-        path = data_file(self.data)
+        path = data_file(self.data, SIM)
         return {"data": path if path == Path(self.data) else path.parent}
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the model."""
         if self.model.multi_step > 1:
             raise ConfigError("model.multi_step", "is of a forward model", given=str(self.model.multi_step))
-        path = data_file(self.data)
+        path = data_file(self.data, SIM)
         data = parts(path, other=REAL, share=self.heldout, seed=self.seed)
         console.phase(f"fitting an inverse model to {len(data.training)} trajectories")
         if data.training.states:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.compiled import describe_uncompilable
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import settings_of
 from gsl.effects.effect import PLACES, Effect, check_own, name_of
@@ -108,4 +109,9 @@ def _replay(plant: Plant) -> np.ndarray:
     time = np.arange(TICKS + COMMANDS - 1)[::-1, None]
     commands = start + SWING * np.sin(0.4 * time + np.arange(n)) - SWING * np.sin(np.arange(n))
     windows = Windows(np.ascontiguousarray(commands)[None], np.array([[start, np.zeros(n)]]), np.zeros(1))
-    return Held.of(plant, STEP, PERIOD).replay(windows)
+    try:
+        return Held.of(plant, STEP, PERIOD).replay(windows)
+    except Exception as error:
+        if (line := describe_uncompilable(error)) is None:
+            raise
+        raise AssertionError(line) from None

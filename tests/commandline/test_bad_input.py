@@ -64,7 +64,7 @@ ARM = "experiment=arm preset=toy grounding=gat"
             "forward_model.variables = LKnePitch: the robot has no ",
         ),
         ("compare +world@worlds.mine=robot rank=true", "rank = true: needs worlds that are simulated"),
-        ("iterate world=nao_worn", "world: here a world has a role; say real=... or sim=..."),
+        ("iterate world=nao_worn", "world: has a role here; say real=... or sim=..."),
     ],
 )
 def test_a_setting_that_does_not_fit(arguments: str, line: str, tmp_path: Path) -> None:
@@ -85,7 +85,7 @@ def test_a_setting_that_does_not_fit(arguments: str, line: str, tmp_path: Path) 
             "runs/chain/optimize: holds optimize, but collect or import is needed",
         ),
         (
-            ("train-forward", "data=chain"),
+            ("export", "trajectories=chain", "format=csv"),
             "several artifacts fit, name one of them: chain/collect_real, chain/collect_sim",
         ),
         ((*GAT, "grounding.forward_model=chain/train_inverse"), "holds train_inverse, but train_forward is needed"),

@@ -126,7 +126,7 @@ def test_what_is_wrong_is_one_line(
     ("arguments", "message"),
     [
         (["evaluate"], "gsl evaluate: subject: has no value yet; say subject=...\n"),
-        (["evaluate", "world=worn", "subject=s"], "gsl evaluate: world: here a world has a role; say "),
+        (["evaluate", "world=worn", "subject=s"], "gsl evaluate: world: has a role here; say "),
         (["evaluate", "real=wrn", "subject=s"], "gsl evaluate: no world called wrn; did you mean worn?"),
         (["colect"], "gsl colect: No such command 'colect'. Did you mean 'collect'?\n"),
         (["collect", "--jsn"], "gsl collect: No such option: --jsn"),

@@ -76,6 +76,15 @@ def test_within_a_guessed_noise_nothing_is_named(cost: float, guessed: bool, wor
     assert (verdict.word, verdict.hollow) == (word, word == "unknown")
 
 
+@pytest.mark.parametrize(
+    ("cost", "guessed", "word"), [(7.0, False, "causes"), (7.0, True, "unknown"), (100.0, False, "unknown")]
+)
+def test_below_a_measured_noise_a_law_has_nothing_to_explain(cost: float, guessed: bool, word: str) -> None:
+    """A log of a simulation without noise: what its time steps leave is far below the floor, and a law halves it."""
+    chosen = replace(friction("all", cost), levels=np.full(3, cost / 100.0))
+    assert Judge(1.0, guessed=guessed).judge(selection(chosen), missing=2.0).word == word
+
+
 def test_a_spurious_effect_that_is_cheapest_and_fails_hides_no_other() -> None:
     """It gains much in one sample of eight and nothing elsewhere, the right one in every sample."""
     right, none = friction("all", 100.0), replace(NONE, costs=np.array([8000.0] + 7 * [114.0]))

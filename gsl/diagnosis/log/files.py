@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.body import Robot
+from gsl.core.interfaces import REAL
 from gsl.core.other_commands import OTHER_COMMANDS, has_other_commands
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.log import Log, cut_log
@@ -38,7 +39,7 @@ def log_files(reference: str) -> list[Path]:
         if files:
             return files
     try:
-        return [data_file(reference)]
+        return [data_file(reference, REAL)]
     except ArtifactError as error:
         if folder.is_dir() and any(readable(path) for path in folder.iterdir()):
             problem = f"holds no trajectory file; make one of its logs first: {suggest_import(folder)}"

@@ -112,9 +112,10 @@ class Judge:
         remaining = chosen.level / self.expected
         worst_joint = chosen.levels.max() / max(1.0, self.expected)
         strange = max(np.log(remaining) / np.log(how.foreign), np.log(worst_joint) / np.log(how.local))
+        if max(remaining, worst_joint) <= how.beneath and not (chosen.candidates and self.guessed):
+            missing = 0.0  # a law has nothing to explain
         if not chosen.candidates:
-            nothing_left = max(remaining, worst_joint) <= how.beneath
-            word = "unknown" if max(strange, 0.0 if nothing_left else missing) > 1.0 else "no_gap"
+            word = "unknown" if max(strange, missing) > 1.0 else "no_gap"
             return Verdict(word, (), (), 0.0, remaining, 1.0, how.whole, missing)
         causes = tuple(self._cause(selection, k) for k in range(chosen.size))
         complete = self._completeness(explained, float(strange), missing)
