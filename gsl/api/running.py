@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import is_dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -55,6 +56,8 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
         if folder is not None:  # effects of a world that is there already stay
             load_own_effects(folder, find_trust(arguments))
         composition = compose(command, arguments)
+        for key in objects.keys() & composition.config.keys():
+            _refer(composition.config[key], describe(objects[key]))
         config = resolve(composition)
     trust = [*composition.trust]
     for key, value in objects.items():
@@ -67,6 +70,13 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
     place = Path(document["folder"])
     made = Artifact(place, manifest.read(place), unchanged=document["unchanged"])
     return (Verdict if made.manifest.kind == "diagnose" else Result)(made, tuple(trust))
+
+
+def _refer(settings: Any, component: Mapping[str, Any]) -> None:
+    """Let what refers to settings see those of a component: the robot of an excitation is the world's."""
+    for name in (settings.keys() & component.keys()) - {"_target_"}:
+        if isinstance(component[name], str | int | float | bool):
+            settings[name] = component[name]
 
 
 def diagnose(log: Batch | Path | str, world: World | str, *, name: str = "diagnosis", **settings: Any) -> Verdict:

@@ -148,13 +148,16 @@ def out_of_date(folder: Path, read: Callable[[Path], Manifest] = manifest.read) 
             continue
         for parent in parents:
             place = _place(child, parent)
-            if not (place / manifest.NAME).is_file():
-                continue  # a file, or gone: that nobody can say
+            near = (place.parent, place.parent.parent) if place.is_file() else (place,)  # a log is named by its file
+            whole = next((up for up in near if (up / manifest.NAME).is_file()), None)
+            if whole is None:
+                continue  # a file of nobody's, or gone: that nobody can say
             try:
-                same = read(place).contents == parent.hash
+                stored = read(whole)
             except ArtifactError as error:
                 return str(error)
-            if not same:
-                return f"{place.as_posix()} was built anew since {child.as_posix()} was made from it"
-            waiting.append(place)
+            file = stored.files.get(place.relative_to(whole).as_posix())
+            if parent.hash != (stored.contents if whole == place else file and file.sha256):
+                return f"{whole.as_posix()} was built anew since {child.as_posix()} was made from it"
+            waiting.append(whole)
     return None

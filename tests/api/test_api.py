@@ -85,6 +85,12 @@ def test_a_component_goes_as_it_is(elsewhere: Path) -> None:
     assert made.artifact.config["world"]["effects"] == {"torque_limit": {"factor": 0.5}}
 
 
+def test_what_refers_to_a_components_settings_sees_them(elsewhere: Path) -> None:
+    world, short = gsl.make_world("xl330_pendulum"), {"policy.motions": ["steps_large"], "policy.repeats": 1}
+    made = gsl.run("collect", world=world, task="excite", name="pendulum", workers=1, **short)
+    assert made.artifact.config["policy"]["robot"] == world.robot  # type: ignore[attr-defined]
+
+
 def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
     late = {"world.effects.command_latency.delay": 0.02, "world.period": 0.02}
     log = gsl.run("collect", world="xl330_pendulum", task="excite", name="air", workers=1, **late)

@@ -26,6 +26,7 @@ from gsl.storage import hashing, manifest
 from gsl.storage.artifact import Artifact, build
 from gsl.storage.documents import write_json
 from gsl.storage.identity import Identity, changes
+from gsl.storage.lineage import out_of_date
 from gsl.storage.workplace import complete
 
 pytestmark = pytest.mark.slow
@@ -574,6 +575,21 @@ class Chaining(Doubling):
         first = built(Doubling(1), folder.parent / "first", force=True).folder
         built(Doubling(2, data=first), folder.parent / "second", force=True)
         return super().run(folder, console)
+
+
+def test_what_was_made_from_a_file_of_an_artifact_is_out_of_date_with_it(tmp_path: Path) -> None:
+    """A log is named by its file, and a file beside an artifact is nobody's."""
+    first = built(Doubling(1), tmp_path / "first").folder
+    second = built(Doubling(2, data=first / "sub/payload.txt"), tmp_path / "second").folder
+    (tmp_path / "mine.txt").write_text("1")
+    third = built(Doubling(2, data=tmp_path / "mine.txt"), tmp_path / "third").folder
+    assert (out_of_date(second), out_of_date(third)) == (None, None)
+    built(Doubling(3), first, force=True)
+    (tmp_path / "mine.txt").write_text("2")
+    assert out_of_date(third) is None
+    assert (said := out_of_date(second)) and said.endswith(
+        f"first was built anew since {second.as_posix()} was made from it"
+    )
 
 
 LINKS: dict[str, tuple[Callable[[Path], object], str]] = {

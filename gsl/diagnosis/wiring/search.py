@@ -153,7 +153,8 @@ class Search:
         nothing, is the simpler explanation.
         """
         contest = self._contest()
-        off = np.flatnonzero(contest.fit(make=True).cost > NEEDED * NOISE_COST).tolist()
+        alone = contest.fit(make=True).cost
+        off = np.flatnonzero(alone > NEEDED * NOISE_COST).tolist()
         if self.excluded or not off:
             return None
         leads = sorted(self._others(off, contest.screen()), key=lambda lead: -lead[0])[:LEADS]
@@ -162,7 +163,8 @@ class Search:
             fault = self._refine(lead)
             after = self._contest(fault).fit(make=True)
             gain = float((fit.cost - after.cost).mean())
-            if self._is_physics(fault, after):
+            nothing_off = alone[list(fault.joints)].mean() <= NEEDED * NOISE_COST  # another rate fits noise, too
+            if nothing_off or self._is_physics(fault, after):
                 continue
             if after.cost.mean() < EXPLAINED * NOISE_COST and gain > max(BETTER * fit.cost.mean(), MUCH / count):
                 return Stand(fault, fit, after)
