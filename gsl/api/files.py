@@ -32,4 +32,6 @@ def write_trajectories(path: Path | str, batch: Batch) -> None:
         raise ConfigError("batch", "is no batch, as roll_out and read_trajectories return", given=str(batch))
     if place.is_dir() or not place.parent.is_dir():
         raise ConfigError("path", "is no file in a folder that exists", given=str(path))
+    if place.suffix not in (".parquet", ""):
+        raise ConfigError("path", "is written as .parquet; gsl export writes other formats", given=str(path))
     write_file(place, batch)

@@ -37,6 +37,7 @@ from gsl.effects.effect import names, withheld
 from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
+LOGS = ("real", "reference")  # settings that name recorded trajectories
 WHOLE = "iterate"  # the command, and the setting of others, that makes what a grounding refers to
 MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo|model)")
 
@@ -158,7 +159,10 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
         except HydraException as error:
             raise ConfigError(key, _unreadable(override, parser), given=value) from error
         if read.is_sweep_override() and not multirun:
-            listed = f"; a list is written '{key}=[{value}]'" if read.is_choice_sweep() else ""
+            listed = (
+                f"a list is written '{key}=[{value}]'" if key not in LOGS else "several logs are one folder of files"
+            )
+            listed = f"; {listed}" if read.is_choice_sweep() else ""
             raise ConfigError(key, f"several values need --multirun{listed}")
         if _is_choice(read) and not (read.is_sweep_override() or isinstance(read.value(), str | list | dict)):
             raise ConfigError(key.rpartition("@")[2], "takes the name of a file", given=value)

@@ -59,7 +59,7 @@ class Init:
     velocity: Annotated[float | None, setting("speed without load where it says none", unit="rad/s", gt=0)] = None
     lower: Annotated[float | None, setting("least position where it says no range", unit="rad")] = None
     upper: Annotated[float | None, setting("greatest position where it says no range", unit="rad")] = None
-    period: Annotated[float, setting("control period of your logs", unit="s", gt=0)] = 0.02
+    period: Annotated[float, setting("control period of your logs", unit="s", gt=0, le=0.1)] = 0.02
 
 
 def write_configuration(arguments: Sequence[str], worlds: Collection[str], console: Console) -> None:

@@ -69,8 +69,9 @@ def _rewritten(argument: str, roles: Mapping[str, str], chosen: Collection[str])
         raise ConfigError(argument, "has no value; write key=value")
     if key.startswith("+"):
         return argument
-    if key in FILE_GROUPS and (value.endswith((".yaml", ".yml")) or Path(value).is_file()):
-        return f"{key}={_as_option(key, Path(value))}"
+    plain = value[1:-1] if value[:1] in ("'", '"') and value[-1:] == value[0] else value
+    if key in FILE_GROUPS and (plain.endswith((".yaml", ".yml")) or Path(plain).is_file()):
+        return f"{key}={_as_option(key, Path(plain))}"
     if key in roles:
         return f"{roles[key]}={value}"
     if effect_path(key) or key in COMMAND_KEYS:

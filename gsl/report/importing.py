@@ -9,6 +9,7 @@ import numpy as np
 
 from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.series import Lag
+from gsl.core.words import several
 from gsl.storage.importers.assembly import Episode
 from gsl.storage.importers.suspicions import (
     MOVES,
@@ -158,7 +159,7 @@ def tables(document: Mapping[str, Any]) -> Iterator[tuple[str, tuple[str, ...], 
     rows = [_row(episode) for episode in episodes[:SHOWN]]
     titles = ("episode", "name", "rows", "time [s]", "rate [Hz]", "jitter [ms]", "longest step [ms]", "lag [ms]")
     more = f"and {len(episodes) - SHOWN} more" if len(episodes) > SHOWN else None
-    yield f"{len(episodes)} episodes in {document['files']} files", titles, rows, more
+    yield f"{several(len(episodes), 'episode')} in {several(document['files'], 'file')}", titles, rows, more
     yield "channels", ("column", "unit", "least", "most", ""), [_channel(channel) for channel in channels], None
 
 

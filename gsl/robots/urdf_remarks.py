@@ -57,7 +57,7 @@ def _dynamics(root: xml.Element) -> list[str]:
     if not joints:
         return []
     names = ", ".join(joints)
-    return [f"<dynamics> is friction, and the world's ({names}): gsl init writes it there, as effects; else add them"]
+    return [f"<dynamics> of {names} is friction, an effect of the world: gsl init writes it into the world's file"]
 
 
 def _floating(root: xml.Element) -> Iterator[str]:

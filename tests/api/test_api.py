@@ -117,6 +117,7 @@ def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
         (lambda: gsl.make_world("nao_worn", effects={"torque_limit": {}}), "effects.torque_limit.factor: has no value"),
         (lambda: gsl.make_world("nao_worn", effects=3), "world.effects = 3: is a mapping of effects by name"),
         (lambda: gsl.run(3), "command = 3: there is none of this name"),  # type: ignore[arg-type]
+        (lambda: gsl.run("import", mapping="no.yaml"), "mapping = no.yaml: there is no such file"),
         (lambda: gsl.run("collect", world=None), "world = null: takes the name of a file"),
         (lambda: gsl.run("collect", name={1}), "settings = set: are numbers, texts"),
         (lambda: gsl.run("collect", world=gsl.make_world("nao_ideal"), **{"world.step": 0.001}), "is below world"),

@@ -100,6 +100,7 @@ def test_a_command_key_reaches_a_stage_that_has_such_a_field(elsewhere: Path) ->
         (["episodes"], "episodes: has no value; write key=value"),
         (["episodes=[1"], "episodes = [1: cannot be read"),
         (["episodes=1,2"], "episodes: several values need --multirun; a list is written 'episodes=[1,2]'"),
+        (["real=a,b"], "real: several values need --multirun; several logs are one folder of files"),
         (["episodes=${nope}"], "episodes: refers to nope, and this command has no such setting"),
         (["force=maybe"], "force = maybe: must be true or false"),
         (["name="], "name: must not be empty"),

@@ -90,7 +90,7 @@ def test_what_is_left_open_is_derived_and_what_is_left_out_is_told() -> None:
     remarks = " | ".join(ours.remarks)
     assert (
         "column.stl" in remarks
-        and "<dynamics> is friction, and the world's (elbow)" in remarks
+        and "<dynamics> of elbow is friction, an effect of the world" in remarks
         and "slide is held at 0.01 m (follows left_finger by a factor of 0.02; only 1 and -1 can be driven)" in remarks
     )
 

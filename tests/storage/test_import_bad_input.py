@@ -86,6 +86,7 @@ WRONG = {
     "ticks": (lambda c: {n: np.round(2048 + 652 * v) if n != "t" else v for n, v in c.items()}, "are these ticks"),
     "milliseconds for seconds": (scaled(1e6, "t"), "rows are 1e\\+04 s apart; is time"),
     "microseconds in a mapping of seconds": (scaled(1e-6, "t"), "rows are 1e-08 s apart"),
+    "microseconds for milliseconds": (scaled(1e-3, "t"), "rows are 1e-05 s apart"),
     "a clock that starts again": (
         lambda c: {name: np.concatenate([values, values]) for name, values in c.items()},
         "column t, line 303: the clock jumps back by 3 s; cut the file there, or sort its rows",

@@ -219,7 +219,7 @@ def test_what_is_missing_is_said_in_one_line(home: Path) -> None:
     said = refused("optimize", *OWN, "grounding=shrink", "name=refused", folder=home)
     assert said == "grounding.model: is missing; name a run of gsl train-grounding"
     said = refused("train-grounding", *OWN, "grounding=shrink", "name=refused", folder=home)
-    assert said == "real: is missing; the grounding learns from real trajectories"
+    assert said == "real: is missing; the grounding learns from real trajectories: a run of gsl collect"
     said = refused("optimize", *OWN, "grounding=shrink", "grounding.most=-1", "name=refused", folder=home)
     assert "grounding.most" in said
 
