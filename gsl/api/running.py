@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import is_dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, cast
+
+from omegaconf import DictConfig, OmegaConf
 
 from gsl.api.files import write_trajectories
 from gsl.api.overrides import overrides
@@ -56,8 +58,7 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
         if folder is not None:  # effects of a world that is there already stay
             load_own_effects(folder, find_trust(arguments))
         composition = compose(command, arguments)
-        for key in objects.keys() & composition.config.keys():
-            _refer(composition.config[key], describe(objects[key]))
+        _refer(composition.config, {key: describe(value) for key, value in objects.items()})
         config = resolve(composition)
     trust = [*composition.trust]
     for key, value in objects.items():
@@ -72,11 +73,14 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
     return (Verdict if made.manifest.kind == "diagnose" else Result)(made, tuple(trust))
 
 
-def _refer(settings: Any, component: Mapping[str, Any]) -> None:
-    """Let what refers to settings see those of a component: the robot of an excitation is the world's."""
-    for name in (settings.keys() & component.keys()) - {"_target_"}:
-        if isinstance(component[name], str | int | float | bool):
-            settings[name] = component[name]
+def _refer(config: DictConfig, components: Mapping[str, Mapping[str, Any]]) -> None:
+    """Let what refers to settings see those of components: the robot of an excitation is the world's."""
+    written = cast(dict[str, Any], OmegaConf.to_container(config, resolve=False))
+    for key, component in components.items():
+        settings = written.get(key)
+        for name in settings.keys() & component.keys() - {"_target_"} if isinstance(settings, dict) else ():
+            if isinstance(component[name], str | int | float | bool) and "${" not in str(component[name]):
+                config[key][name] = component[name]
 
 
 def diagnose(log: Batch | Path | str, world: World | str, *, name: str = "diagnosis", **settings: Any) -> Verdict:

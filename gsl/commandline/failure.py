@@ -37,8 +37,11 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     text = " ".join(str(failure).split())
     if isinstance(failure, OSError) and failure.filename is not None:
         return f"{failure.filename}: {failure.strerror or text}", 1
-    if type(failure).__module__.startswith("numba.") and (line := _describe_uncompilable(failure)) is not None:
-        return line, 1
+    if type(failure).__module__.startswith("numba."):
+        from gsl.core.compiled import describe_uncompilable
+
+        if (line := describe_uncompilable(failure)) is not None:
+            return line, 1
     if (line := describe_own(failure)) is not None:
         return f"{line}; GSL_TRACEBACK=1 shows more", 1
     if isinstance(failure, MemoryError) or isinstance(failure, OSError) and failure.errno == errno.ENOMEM:
@@ -50,12 +53,6 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
     if isinstance(failure, RecursionError):
         return "what was given is nested too deeply", 2
     return f"internal error: {type(failure).__name__}: {text}; GSL_TRACEBACK=1 shows where", 1
-
-
-def _describe_uncompilable(failure: BaseException) -> str | None:
-    from gsl.core.compiled import describe_uncompilable  # numba takes a second
-
-    return describe_uncompilable(failure)
 
 
 def is_text(word: str) -> bool:

@@ -160,6 +160,7 @@ for _compare, _sign in (
     (operator.eq, "=="),
 ):
     _define(_compare, mask, 2, _comparison(_sign))
+_define(operator.ne, mask, 2, lambda _, builder, a, b: builder.fcmp_unordered("!=", a, b))
 _define(operator.neg, lanes, 1, _operation("fneg"))
 for _absolute in (abs, np.abs):
     _define(_absolute, lanes, 1, _find_call("fabs"))

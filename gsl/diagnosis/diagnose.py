@@ -129,7 +129,9 @@ def _search(
             remaining = selection.chosen.level / (how.noise_cost * (1.0 + log.noise.slack))
             reasons |= find_idle(selection.chosen, options.verdict.widening(remaining))
         if not reasons:
-            return search.look_again(selection), refuted
+            selection = search.look_again(selection)
+            problem.memory.clear()
+            return selection, refuted
         refuted |= reasons
         problem = problem.without(refuted)
 

@@ -204,7 +204,7 @@ def _hinge(name: str, node: xml.Element) -> Hinge:
     limits = {
         key: read_number(limit, key, "<limit>") for key in _LIMITS if limit is not None and limit.get(key) is not None
     }
-    if {*ENDS} & set(limits):
+    if {*ENDS} & set(limits) and kind != "continuous":
         limits = dict.fromkeys(ENDS, 0.0) | limits  # what the format says of one that is left out
     safety, follows = find_only(node, "safety_controller"), None
     soft = {

@@ -75,9 +75,8 @@ class TrainForward:
         """Write the model and the trajectories it has not seen."""
         path = data_file(self.data, REAL)
         newest = parts(path, other=SIM, share=self.heldout, seed=self.seed)
-        earlier = {
-            file: earlier_batch(file, newest.training) for file in [data_file(path, REAL) for path in self.earlier]
-        }
+        before = [data_file(reference, REAL) for reference in self.earlier]
+        earlier = {file: earlier_batch(file, newest.training) for file in before}
         data = aggregate(newest, list(earlier.values()))
         console.phase(f"fitting a forward model to {len(data.training)} trajectories")
         if data.training.states:

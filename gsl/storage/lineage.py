@@ -155,9 +155,13 @@ def out_of_date(folder: Path, read: Callable[[Path], Manifest] = manifest.read) 
             try:
                 stored = read(whole)
             except ArtifactError as error:
+                if whole != place:
+                    continue
                 return str(error)
             file = stored.files.get(place.relative_to(whole).as_posix())
-            if parent.hash != (stored.contents if whole == place else file and file.sha256):
+            if whole != place and file is None:
+                continue  # beside an artifact, and nobody's
+            if parent.hash != (file.sha256 if file else stored.contents):
                 return f"{whole.as_posix()} was built anew since {child.as_posix()} was made from it"
             waiting.append(whole)
     return None

@@ -22,18 +22,22 @@ MAKERS = {
     "optimize": "optimize",
 }
 """Commands that make an artifact of a run, by the name that it has there."""
+SIDES = {"collect_real", "collect_sim"}
 ALIKE = 0.8  # evaluat is evaluate; evaluate_none is not
 CHOICES = 20  # of artifacts in a message
 ALTERNATIVES = 3  # of the same name further down in a run: those of its first iterations
 
 
-def resolve(reference: str | Path, *, kind: str | tuple[str, ...] | None = None, runs: Path = RUNS) -> Path:
+def resolve(
+    reference: str | Path, *, kind: str | tuple[str, ...] | None = None, runs: Path = RUNS, side: str = ""
+) -> Path:
     """Return what `reference` names: a file, an artifact, or the only artifact of `kind` below a folder or a run.
 
     Args:
         reference: A path, or the name of a run in `runs`, which may go on into it: `quick-start/optimize`.
         kind: What the artifact has to be, or one of several; None takes any.
         runs: Folder of the runs.
+        side: `real` or `sim`: which is meant of a run that has collected on both and has nothing else of the kind.
 
     Raises:
         ArtifactError: There is no such thing, it is of another kind, or several fit.
@@ -52,6 +56,9 @@ def resolve(reference: str | Path, *, kind: str | tuple[str, ...] | None = None,
     fitting = [artifact for artifact in artifacts if kinds is None or artifact.manifest.kind in kinds]
     if len(fitting) == 1:
         return fitting[0].folder
+    sides = {artifact.folder.name: artifact.folder for artifact in fitting if artifact.folder.parent == place}
+    if side and sides.keys() == SIDES and len(fitting) == len(SIDES):
+        return sides[f"collect_{side}"]
     if fitting:
         choices = ", ".join(name_run(artifact.folder, runs) for artifact in fitting[:CHOICES])
         choices += f" and {len(fitting) - CHOICES} more" if len(fitting) > CHOICES else ""

@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.core.budget import ARTIFACT_BYTES, check_file, parse_json
 from gsl.core.trajectory import Batch
-from gsl.errors import ArtifactError, TrajectoryError
+from gsl.errors import TrajectoryError
 from gsl.storage import documents
 from gsl.storage.parquet import check_declared
 from gsl.storage.references import resolve
@@ -25,19 +25,12 @@ DATA = "trajectories.parquet"
 METADATA_KEY = b"gsl"
 
 
-def data_file(reference: str, role: str = "") -> Path:
+def data_file(reference: str, side: str = "") -> Path:
     """Return the trajectory file that a path, an artifact of `collect` or `import`, or a run's name stands for.
 
-    Of a run that has collected on both sides, a role chooses: `real` or `sim`.
+    Of a run that has collected on both sides, `real` or `sim` says which.
     """
-    kinds = "collect", "import"
-    try:
-        artifact = resolve(reference, kind=kinds)
-    except ArtifactError as error:
-        try:
-            artifact = resolve(f"{reference}/collect_{role}", kind=kinds)
-        except ArtifactError:
-            raise error from None
+    artifact = resolve(reference, kind=("collect", "import"), side=side)
     return artifact / DATA if artifact.is_dir() else artifact
 
 

@@ -46,7 +46,7 @@ def _functions(x: float, result: np.ndarray) -> None:
     result[3], result[4] = np.tanh(x), np.arctan(x)
     result[5], result[6] = np.sqrt(abs(x)), np.log(1.0 + np.abs(x))
     result[7], result[8], result[9] = x**2, x**3, np.sign(x)
-    result[10], result[11] = where(x >= 0.0, 1.0, x), where(x <= 0.0, 1.0, x)
+    result[10], result[11] = where(x >= 0.0, 1.0, x), where((x <= 0.0) if False else x != 0.0, 1.0, x)
 
 
 @compile_kernel

@@ -1,5 +1,7 @@
 """What joints share in their calibration is handed over to a cause, and a cause is split where groups differ."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -81,10 +83,12 @@ def test_friction_that_differs_between_legs_and_arms_is_told_apart(dry: Problem)
 def test_a_search_without_an_effect_finds_what_it_would_find_anew(dry: Problem) -> None:
     some = dry.only(("coulomb_friction", "viscous_friction", "load_friction"))
     none = some.fit_calibration()
-    extend(some, none, 3)
+    first, _ = extend(some, none, 3)
     again = some.without(("load_friction",))
     fits, screening = extend(again, none, 3)
     assert "load_friction" not in {lead.candidate.effect for lead in screening.leads}
-    anew, _ = extend(again.on(again.train, again.held_out), none, 3)
+    anew, _ = extend(replace(again, train=again.train), none, 3)
     assert [fit.cost for fit in fits] == [fit.cost for fit in anew]
+    assert any(fit is other for other in first for fit in fits)
+    assert not any(fit is other for other in anew for fit in fits)
     assert again.fit_calibration() is none

@@ -299,6 +299,10 @@ SETTINGS = {
         {"signals": {"action": "goal_{joint}", "position": "q_{joint}", "reward": {"column": "t", "unit": "1"}}},
         "mapping.signals.reward: is a name of the contract that no log fills; call it otherwise",
     ),
+    "a list of no columns": (
+        {"signals": {"action": {"column": []}, "position": "q"}},
+        "mapping.signals.action.column: names no column",
+    ),
     "no positions": ({"signals": {"action": "a"}}, "mapping.signals.position: has no value"),
     "a sign": (
         {"signals": {"action": "goal_{joint}", "position": {"column": "q_{joint}", "sign": 2}}},

@@ -52,7 +52,7 @@ class Problem:
     tick: Callable[[str], None]
     glances: int | None = None
     settings: SearchSettings = field(default_factory=SearchSettings)
-    memory: dict[tuple[Any, ...], Any] = field(default_factory=dict, compare=False, repr=False)
+    memory: dict[tuple[Any, ...], Any] = field(default_factory=dict, init=False, compare=False, repr=False)
 
     @classmethod
     def of(
@@ -99,17 +99,19 @@ class Problem:
         most = self.glances or (count // 2 if count > self.settings.few else count)
         return replace(self.train, pieces=self.train.pieces.take(spread(np.arange(count), most)))
 
-    def on(self, train: Bench, held_out: Bench) -> Problem:
-        """Return the same problem on other windows."""
-        return replace(self, train=train, held_out=held_out, memory={})
-
     def only(self, effects: Sequence[str]) -> Problem:
         """Return the problem with a part of the library."""
-        return replace(self, library=tuple(part for part in self.library if part.effect in effects))
+        return self._part([part for part in self.library if part.effect in effects])
 
     def without(self, effects: Sequence[str] | Mapping[str, Any]) -> Problem:
         """Return the problem without a part of the library."""
-        return replace(self, library=tuple(part for part in self.library if part.effect not in effects))
+        return self._part([part for part in self.library if part.effect not in effects])
+
+    def _part(self, library: Sequence[Candidate]) -> Problem:
+        """Return the problem with another library and the same memory: `replace` alone forgets."""
+        part = replace(self, library=tuple(library))
+        object.__setattr__(part, "memory", self.memory)
+        return part
 
     def fit_calibration(self) -> Hypothesis:
         """Return the hypothesis without an effect."""
@@ -136,6 +138,8 @@ class Problem:
         asked = (*(part.key for part in candidates), start.tobytes(), at.tobytes(), every, rounds)
         if asked not in self.memory:
             self.memory[asked] = self._fit(candidates, start, at, every, rounds)
+        else:
+            self.tick("")
         fit: Hypothesis = self.memory[asked]
         return fit
 

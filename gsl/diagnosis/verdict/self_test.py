@@ -85,7 +85,7 @@ def repose(log: Log, problem: Problem, truth: Hypothesis, rng: np.random.Generat
     train, held_out = (
         Bench(simulator, same(bench.pieces), bench.comparison) for bench in (problem.train, problem.held_out)
     )
-    return problem.on(train, held_out)
+    return replace(problem, train=train, held_out=held_out)
 
 
 def simulate_nulls(log: Log, problem: Problem, none: Hypothesis, options: Options) -> list[float]:

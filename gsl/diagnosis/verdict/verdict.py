@@ -112,8 +112,13 @@ class Judge:
         remaining = chosen.level / self.expected
         worst_joint = chosen.levels.max() / max(1.0, self.expected)
         strange = max(np.log(remaining) / np.log(how.foreign), np.log(worst_joint) / np.log(how.local))
-        if max(remaining, worst_joint) <= how.beneath and not (chosen.candidates and self.guessed):
-            missing = 0.0  # a law has nothing to explain
+        quiet = (
+            max(chosen.level / self.noise_cost, chosen.levels.max())
+            if chosen.candidates
+            else max(remaining, worst_joint)
+        )
+        if quiet <= how.beneath and not (chosen.candidates and self.guessed):
+            missing = 0.0  # below the noise, or what a user says does not matter, a law has nothing to explain
         if not chosen.candidates:
             word = "unknown" if max(strange, missing) > 1.0 else "no_gap"
             return Verdict(word, (), (), 0.0, remaining, 1.0, how.whole, missing)

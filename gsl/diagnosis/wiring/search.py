@@ -36,6 +36,7 @@ ALL = 0.7  # share of the joints in question, from which on a fault of timing is
 LEADS = 3  # that are fitted in a round
 ROUNDS = 6
 EVEN = 1.1  # factor on the cost of what is left within which another kind of fault does as well
+MOVES = 0.02  # range of a command [rad], below which a joint shows no timing
 LATE = 0.3  # of a row, from which on a delay may be that of a whole row
 WHOLE = 0.07  # of a row, by which a delay may be off a whole number of rows: gains of one make shift it by as much
 AGREE = 0.1  # of a row, by which delays of the joints may differ then
@@ -158,15 +159,19 @@ class Search:
         if self.excluded or not off:
             return None
         leads = sorted(self._others(off, contest.screen()), key=lambda lead: -lead[0])[:LEADS]
-        count = contest.count
+        moving = np.ptp(np.concatenate([episode.action for episode in self.batch.episodes]), axis=0) > MOVES
         for _, lead in leads:
+            own = [k for k in lead.joints if moving[k]] or list(lead.joints)
+            if alone[own].mean() <= NEEDED * NOISE_COST:  # what is noise fits another rate, too
+                continue
             fault = self._refine(lead)
             after = self._contest(fault).fit(make=True)
             gain = float((fit.cost - after.cost).mean())
-            nothing_off = alone[list(fault.joints)].mean() <= NEEDED * NOISE_COST  # another rate fits noise, too
-            if nothing_off or self._is_physics(fault, after):
+            if self._is_physics(fault, after):
                 continue
-            if after.cost.mean() < EXPLAINED * NOISE_COST and gain > max(BETTER * fit.cost.mean(), MUCH / count):
+            if after.cost.mean() < EXPLAINED * NOISE_COST and gain > max(
+                BETTER * fit.cost.mean(), MUCH / contest.count
+            ):
                 return Stand(fault, fit, after)
         return None
 

@@ -34,6 +34,8 @@ def references(
         ConfigError: A joint has none, or that of another.
     """
     references = [_reference(word, table) for word in _words(name, signal, joints)]
+    if not references:
+        raise ConfigError(f"mapping.signals.{name}.column", "names no column")
     twice = [reference for reference in references if references.count(reference) > 1]
     if twice and name in PER_JOINT:
         problem = f"is that of several joints for {name}; every joint has one of its own"
