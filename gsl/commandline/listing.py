@@ -28,6 +28,7 @@ from gsl.storage.manifest import (
     Manifest,
     Parent,
     check_files,
+    check_intact,
     damage,
     describe_damage,
     find_damage,
@@ -123,6 +124,7 @@ def open_artifact(reference: str, console: Console) -> None:
     if not (page.is_file() or PAGE in stored.files):
         raise ArtifactError(folder, f"has no page: {stored.kind} writes none; gsl show says what is in it")
     check_files(folder, stored, (PAGE,))
+    check_intact(folder, stored)
     shown = has_display() and webbrowser.open(page.absolute().as_uri())
     console.result({"page": page, "opened": shown}, text=page.as_posix())
 

@@ -42,6 +42,7 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
     folder = resolve(reference)
     old = Artifact(folder, manifest.read(folder))
     manifest.check_intact(folder, old.manifest, only=(CONFIG,))  # other settings would be another run
+    damaged = manifest.find_damage(folder, old.manifest)
     place = Path(words["out"]) if words.get("out") else _beside(folder)
     if place.exists():
         raise ArtifactError(place, "exists; take it away or choose another out=")
@@ -59,6 +60,9 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
         ["what", "sha256", ""],
         [(name, sha[:SHORT], "the same" if same else "differs") for name, sha, same in rows],
     )
+    if not other and damaged:
+        said = f"{manifest.damage(folder, damaged)}; {place.as_posix()} holds what was made"
+        return console.error(said, 1, command="gsl rerun")
     if not other:
         console.result(document, text=place.as_posix())
         return 0

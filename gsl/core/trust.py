@@ -97,6 +97,8 @@ def check_code(plain: Any, trust: Collection[str] = (), where: str = "", *, refe
     if refused := [mention for mention in foreign if not _below(mention[2], trust)]:
         path, name, module = refused[0]
         shown = "" if name == _MISSING else name
+        if "${" in name:
+            raise ConfigError(path, "refers to something else, which this file cannot; write the value", given=shown)
         if module.partition(".")[0] in sys.stdlib_module_names:
             raise ConfigError(path, "is of Python's own library, which can run programs; no file needs it", given=shown)
         needed = [word for word in trust if any(_below(other, [word]) for _, _, other in foreign)]

@@ -126,7 +126,7 @@ def build(
     package, made = package_of(type(stage)), getattr(stage, "makes", ())
     identity = identify(stage.kind, config, sources, package, made=made)
     for stale in filter(None, map(out_of_date, sources.values())):
-        console.status(f"warning: {stale}; the same commands again bring it up to date")
+        console.status(f"warning: {stale}; the same commands with force=true bring it up to date")
     with hold_lock(out), stoppable(), explain_failures(out.parent):
         forced = getattr(stage, "forced", "rebuilds it")
         if (existing := _existing(out, identity, config, force=force, forced=forced)) is not None:

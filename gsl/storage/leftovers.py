@@ -56,7 +56,7 @@ def find_stale(runs: Path, *, stale: bool, orphaned: bool) -> list[Leftover]:
         above = [parent.path for parent in made.parents if not (folder / parent.path).exists()]
         if orphaned and above:
             reasons[folder] = f"orphaned: {Path(os.path.normpath(folder / above[0])).as_posix()} is gone"
-        elif stale and (change := out_of_date(folder, read)):
+        elif stale and (change := out_of_date(folder, read, damaged=False)):
             reasons[folder] = f"stale: {change}"
     return [Leftover(folder, why, _measure_artifact(folder), artifact=True) for folder, why in reasons.items()]
 

@@ -16,7 +16,7 @@ from gsl.storage.manifest import Manifest, Parent
 LONGEST = 200
 """Generations of a lineage, of which an iteration adds less than ten."""
 COPY = "copy it to this place"
-REPEAT = "the same commands again bring what was made from it up to date"
+REPEAT = "the same commands with force=true bring what was made from it up to date"
 
 
 @dataclass(frozen=True)
@@ -129,12 +129,13 @@ def broken_link(folder: Path, stored: Manifest) -> str | None:
     return None
 
 
-def out_of_date(folder: Path, read: Callable[[Path], Manifest] = manifest.read) -> str | None:
+def out_of_date(folder: Path, read: Callable[[Path], Manifest] = manifest.read, *, damaged: bool = True) -> str | None:
     """Return which artifact above this one was built anew after it was used, by the manifests alone.
 
     Args:
         folder: Of the artifact.
         read: Reads the manifest of a folder; who asks for many artifacts keeps what it has read.
+        damaged: Whether a manifest above that cannot be read is returned as well: it may be mended.
     """
     waiting, seen = [folder], set[Path]()
     while waiting:
@@ -155,7 +156,7 @@ def out_of_date(folder: Path, read: Callable[[Path], Manifest] = manifest.read) 
             try:
                 stored = read(whole)
             except ArtifactError as error:
-                if whole != place:
+                if whole != place or not damaged:
                     continue
                 return str(error)
             file = stored.files.get(place.relative_to(whole).as_posix())

@@ -197,6 +197,26 @@ def test_a_damaged_artifact_is_shown_and_ends_in_1(run: Path) -> None:
     assert said.lines == ["runs/chain/collect_real: its manifest cannot be read; gsl verify says why"]
 
 
+def test_a_rerun_of_a_damaged_artifact_says_where_the_payload_is(run: Path) -> None:
+    flip(run / "runs/chain/collect_real/trajectories.parquet")
+    said = gsl("rerun", "chain/collect_real", folder=run)
+    damaged = f"runs/chain/collect_real/trajectories.parquet: is not as the manifest says; {REMEDY}"
+    there = f"runs/chain{AGAIN}/collect_real holds what was made"
+    assert (said.code, said.lines[-1]) == (1, f"gsl rerun: {damaged}; {there}")
+
+
+def test_no_page_of_a_damaged_artifact_is_opened(run: Path) -> None:
+    flip(run / "runs/chain/optimize/policies.json")
+    said = gsl("open", "chain/optimize", folder=run)
+    assert said.code != 0
+    assert said.lines == [f"gsl open: runs/chain/optimize/policies.json: is not as the manifest says; {REMEDY}"]
+
+
+def test_what_was_made_from_a_damaged_artifact_is_not_removed_as_stale(run: Path) -> None:
+    (run / "runs/chain/optimize/manifest.json").write_bytes(b"{")
+    assert "nothing below runs/ could go" in done("clean", "stale=true", folder=run).out
+
+
 def test_a_run_whose_settings_were_changed_is_not_run_again(run: Path) -> None:
     config = run / "runs/chain/optimize/config.yaml"
     config.write_text(config.read_text().replace("seed: ", "seed: 7"))
