@@ -81,7 +81,7 @@ def _case(frozen: bytes, slot: _Slot) -> dict[str, Any]:
     """Make a case, audit it, and return truth and answer."""
     plant, step, period, programme, seed = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
     rng = np.random.default_rng([seed, slot.number])
-    effects = _draw_effect(plant, rng) if slot.beside else {}
+    effects = draw_effect(plant, rng) if slot.beside else {}
     robot, noise, start_rng = (
         jitter(plant, rng),
         float(rng.uniform(*NOISE)),
@@ -89,7 +89,7 @@ def _case(frozen: bytes, slot: _Slot) -> dict[str, Any]:
     )
 
     def play(commands: Sequence[np.ndarray]) -> Batch:
-        return _record(robot, effects, programme, commands, period, noise, start_rng)
+        return record(robot, effects, programme, commands, period, noise, start_rng)
 
     if slot.kind in KINDS:
         case = wire(slot.kind, programme.commands, play, plant, rng)
@@ -111,15 +111,27 @@ def _case(frozen: bytes, slot: _Slot) -> dict[str, Any]:
     }
 
 
-def _draw_effect(plant: Plant, rng: np.random.Generator) -> dict[str, Any]:
+def draw_effect(plant: Plant, rng: np.random.Generator) -> dict[str, Any]:
+    """Draw a visible effect of the library and its strength, as a world's `effects:`."""
     dial = draw(str(rng.choice(visible())), plant.robot, rng)
     return {dial.effect: dial.entry(float(rng.uniform(*SHARES)))}
 
 
-def _record(
+def record(
     robot: Plant, effects: Mapping[str, Any], programme: Programme, commands: Sequence[np.ndarray], period: float,
     noise: float, rng: np.random.Generator,
 ) -> Batch:  # fmt: skip
+    """Return what a robot logs that plays commands, shape (T, n_joints) each.
+
+    Args:
+        robot: One of the make.
+        effects: As a world's `effects:`.
+        programme: Whose commands these are, or were before a fault.
+        commands: Of each episode.
+        period: Control period [s].
+        noise: Standard deviation of the encoders [rad].
+        rng: Of starts and noise.
+    """
     body = lump(robot.robot)
     n = len(body.controlled)
     targets = [command[:, body.drive] for command in commands]

@@ -38,6 +38,7 @@ from gsl.errors import ConfigError, InputError
 
 REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
 LOGS = ("real", "reference")  # settings that name recorded trajectories
+LOGS_TOGETHER = "several logs are one folder of files"
 WHOLE = "iterate"  # the command, and the setting of others, that makes what a grounding refers to
 MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo|model)")
 
@@ -159,11 +160,9 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
         except HydraException as error:
             raise ConfigError(key, _unreadable(override, parser), given=value) from error
         if read.is_sweep_override() and not multirun:
-            listed = (
-                f"a list is written '{key}=[{value}]'" if key not in LOGS else "several logs are one folder of files"
-            )
-            listed = f"; {listed}" if read.is_choice_sweep() else ""
-            raise ConfigError(key, f"several values need --multirun{listed}")
+            together = f"a list is written '{key}=[{value}]'" if key not in LOGS else LOGS_TOGETHER
+            more = f"; {together}" if read.is_choice_sweep() else ""
+            raise ConfigError(key, f"several values need --multirun{more}")
         if _is_choice(read) and not (read.is_sweep_override() or isinstance(read.value(), str | list | dict)):
             raise ConfigError(key.rpartition("@")[2], "takes the name of a file", given=value)
     return parsed

@@ -21,7 +21,7 @@ from gsl.report.console import Console
 from gsl.robots.catalogue import names
 from gsl.robots.descriptions import PREFIX
 from gsl.robots.hinges import JointSettings, drivable, from_description
-from gsl.robots.joint_limits import is_limit, is_range
+from gsl.robots.joint_limits import ENDS, is_limit, is_range
 from gsl.robots.robot_file import urdf_of
 from gsl.robots.urdf_xml import Description, Hinge, read_description
 from gsl.storage.whole import explain_refusal
@@ -86,7 +86,7 @@ def write_configuration(arguments: Sequence[str], worlds: Collection[str], conso
     description = read_description(urdf)
     hinges = {hinge.name: hinge for hinge in description.hinges}
     added = {name: _stand_in(asked, hinges.get(name)) for name in asked.joints or drivable(description.hinges)}
-    for key in ("effort", "velocity", "lower", "upper"):
+    for key in ("effort", "velocity", *ENDS):
         if getattr(asked, key) is not None and all(getattr(settings, key) is None for settings in added.values()):
             problem = "stands in for what a URDF leaves open, and this one says it of every joint; edit the robot file"
             raise ConfigError(key, problem)
@@ -115,7 +115,7 @@ def _stand_in(asked: Init, hinge: Hinge | None) -> JointSettings:
         return JointSettings()
     limit, slides = hinge.limit, hinge.slides
     missing = {key for key in ("effort", "velocity") if not is_limit(key, limit.get(key, 0.0), slides=slides)}
-    missing |= set() if is_range(limit, slides=slides) else {"lower", "upper"}
+    missing |= set() if is_range(limit, slides=slides) else {*ENDS}
     return JointSettings(**{key: getattr(asked, key) for key in missing})
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+ENDS = ("lower", "upper")  # of a range
 PLACEHOLDERS = {False: {"effort": 1e4, "velocity": 1e3}, True: {"effort": 1e6, "velocity": 1e2}}
 """What no joint of a robot reaches: [N·m], [rad/s] of those that turn; [N], [m/s] of those that slide."""
 BOUNDLESS = {False: 1e3, True: 1e2}  # an end of a range beyond this stands for none [rad], or [m] of a slide
@@ -21,7 +22,7 @@ def is_limit(key: str, value: float, *, slides: bool) -> bool:
 def is_range(limit: Mapping[str, float], *, slides: bool) -> bool:
     """Whether a range says where a joint can move."""
     far = BOUNDLESS[slides]
-    return {"lower", "upper"} <= set(limit) and -far < limit["lower"] < limit["upper"] < far
+    return {*ENDS} <= set(limit) and -far < limit["lower"] < limit["upper"] < far
 
 
 def limits_problem(limit: Mapping[str, float], *, slides: bool) -> str:
@@ -35,7 +36,7 @@ def limits_problem(limit: Mapping[str, float], *, slides: bool) -> str:
     if is_range(limit, slides=slides):
         return ""
     unit = "m" if slides else "rad"
-    if lacking := [key for key in ("lower", "upper") if key not in limit]:
+    if lacking := [key for key in ENDS if key not in limit]:
         has = "has no range" if len(lacking) == 2 else f"has no {lacking[0]}"
     else:
         has = f"its limits are {limit['lower']:g} and {limit['upper']:g} {unit}"

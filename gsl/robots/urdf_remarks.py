@@ -10,6 +10,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from gsl.core.body import Link
+from gsl.robots.joint_limits import ENDS
 
 if TYPE_CHECKING:
     from gsl.robots.urdf_xml import Hinge
@@ -25,7 +26,7 @@ def remarks(root: xml.Element, links: Iterable[Link], hinges: Iterable[Hinge]) -
 
 def _limits(hinges: Iterable[Hinge]) -> Iterator[str]:
     for hinge in hinges:
-        ends = [hinge.limit[key] for key in ("lower", "upper") if key in hinge.limit]
+        ends = [hinge.limit[key] for key in ENDS if key in hinge.limit]
         if hinge.kind == "revolute" and ends and max(map(abs, ends)) > FAR:
             values = " and ".join(f"{end:g}" for end in ends)
             yield f"joint {hinge.name} has the limits {values} rad: are they in degrees? A URDF's are in radians"
@@ -35,7 +36,7 @@ def _soft(hinges: Iterable[Hinge]) -> Iterator[str]:
     for hinge in hinges:
         narrower = [key for key, end in hinge.soft.items() if end != hinge.limit.get(key)]
         if any(hinge.soft.values()) and narrower:
-            ends = " and ".join(f"{hinge.soft[key]:g}" for key in ("lower", "upper") if key in hinge.soft)
+            ends = " and ".join(f"{hinge.soft[key]:g}" for key in ENDS if key in hinge.soft)
             yield f"commands of joint {hinge.name} keep the soft limits of its <safety_controller>: {ends} {hinge.unit}"
         elif not any(hinge.soft.values()) and hinge.soft:
             yield f"joint {hinge.name} has soft limits of 0 in its <safety_controller>: taken as not set"

@@ -15,6 +15,7 @@ from gsl.core.body import Link
 from gsl.core.budget import JOINTS, URDF_BYTES, check_file, within
 from gsl.core.validation import did_you_mean
 from gsl.errors import InputError
+from gsl.robots.joint_limits import ENDS
 from gsl.robots.urdf_numbers import find_only, read_number, read_numbers, read_origin
 from gsl.robots.urdf_remarks import remarks
 from gsl.robots.urdf_shapes import Looks
@@ -24,7 +25,6 @@ T = TypeVar("T")
 TURNING = ("revolute", "continuous")
 SLIDING = "prismatic"
 DRIVEN = (*TURNING, SLIDING)
-ENDS = ("lower", "upper")
 _LIMITS = (*ENDS, "effort", "velocity")
 _SOFT = {"lower": "soft_lower_limit", "upper": "soft_upper_limit"}
 _LEFT = ("${", "$(")  # how an expression begins that xacro would have replaced

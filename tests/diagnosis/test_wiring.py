@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from blind_arm import arm
 
-from gsl.core.body import lump
 from gsl.core.plant import Plant, nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.records import slope
@@ -17,12 +16,11 @@ from gsl.diagnosis.wiring.audit import Audit, audit
 from gsl.diagnosis.wiring.relation import relate
 from gsl.policies.excitation import Excitation
 from gsl.robots.nao import nao
-from gsl_benchmarks.blind.dials import draw, visible
 from gsl_benchmarks.blind.jitter import NOISE, jitter
-from gsl_benchmarks.blind.make import START
 from gsl_benchmarks.blind.programmes import draw_programmes
 from gsl_benchmarks.blind.same import play_same
 from gsl_benchmarks.blind.wiring import KINDS, change, wire
+from gsl_benchmarks.blind_wiring import draw_effect, record
 
 pytestmark = pytest.mark.slow
 
@@ -94,21 +92,10 @@ def test_physics_is_no_wiring(effects: Mapping[str, Any]) -> None:
 @pytest.mark.parametrize("number", [64, 71])
 def test_a_robot_that_is_hardly_off_has_no_other_rate(number: int) -> None:
     """Two of `gsl blind wiring seed=8`, 1.1 noise floors off: another rate took the place of physics."""
-    plant = nominal(nao())
+    plant, rng = nominal(nao()), np.random.default_rng([8, number])
     plan = draw_programmes(Excitation(robot="nao"), 1, PERIOD, np.random.default_rng(8))[0]
-    rng = np.random.default_rng([8, number])
-    dial = draw(str(rng.choice(visible())), plant.robot, rng)
-    effects = {dial.effect: dial.entry(float(rng.uniform(0.1, 1.0)))}
-    robot, noise, starts = jitter(plant, rng), float(rng.uniform(*NOISE)), np.random.default_rng(rng.integers(2**32))
-    drive, n = lump(robot.robot).drive, len(robot.robot.controlled)
-    targets = [path[:, drive] for path in plan.commands]
-    begun = [path[0] + START * starts.standard_normal(len(path[0])) for path in targets]
-    episodes = []
-    for asked, path in zip(plan.commands, play_same(robot, effects, None, targets, begun, PERIOD), strict=True):
-        position = path[:, :n] + noise * starts.standard_normal((len(path), n))
-        episodes.append(Trajectory(PERIOD * np.arange(len(path)), asked, position, slope(position, PERIOD)))
-    names = [{"policy": name} for name in plan.names]
-    log = Batch(tuple(episodes), robot.robot.controlled, PERIOD, {"robot": "nao", "episodes": names})
+    effects, robot, noise = draw_effect(plant, rng), jitter(plant, rng), float(rng.uniform(*NOISE))
+    log = record(robot, effects, plan, plan.commands, PERIOD, noise, np.random.default_rng(rng.integers(2**32)))
     assert audited(log, plant).verdict != "wiring"
 
 
