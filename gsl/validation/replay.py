@@ -115,7 +115,7 @@ def _start(env: BulletEnv, seen: np.ndarray, sent: np.ndarray) -> Start:
     quaternion = tuple(seen[layout["base.orientation"]].tolist())
     parts = (seen[layout[part]] for part in ("base.position", "base.velocity", "gyro"))
     place, velocity, gyro = (part.copy() for part in parts)
-    return Start(Reading(motion, place, quaternion, velocity, gyro, 1.0, ()), sent[:, drive])
+    return Start(Reading(motion, place, quaternion, velocity, gyro, 1.0, np.zeros(0)), sent[:, drive])
 
 
 def _deviations(layout: Layout, seen: np.ndarray, starts: Sequence[Place], ticks: int) -> Deviations:

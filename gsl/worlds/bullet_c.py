@@ -38,19 +38,27 @@ set_torque = _function("b3JointControlSetDesiredForceTorque", _INT, _ADDRESS, _I
 external_force = _function("b3ApplyExternalForceCommandInit", _ADDRESS, _ADDRESS)
 set_external_torque = _function("b3ApplyExternalTorque", types.void, _ADDRESS, _INT, _INT, _ADDRESS, _INT)
 step_simulation = _function("b3InitStepSimulationCommand", _ADDRESS, _ADDRESS)
+request_contacts = _function("b3InitRequestContactPointInformation", _ADDRESS, _ADDRESS)
+set_contact_body_a = _function("b3SetContactFilterBodyA", types.void, _ADDRESS, _INT)
+set_contact_body_b = _function("b3SetContactFilterBodyB", types.void, _ADDRESS, _INT)
+contacts = _function("b3GetContactPointInformation", types.void, _ADDRESS, _ADDRESS)
+CONTACT, LINK_A, NORMAL_FORCE = 22, 3, 13  # size of b3ContactPointData in doubles; where its link (ints) and force are
 
 
-def _as_doubles(typing_context: Any, address: Any) -> Any:
-    """Return an address as a pointer to doubles, in compiled code."""
+def _as_pointer(kind: Any) -> Any:
+    """Return what makes an address a pointer to numbers of a kind, in compiled code."""
 
-    def generate(context: Any, builder: Any, signature: Any, arguments: Sequence[Any]) -> Any:
-        return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
+    def convert(typing_context: Any, address: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, arguments: Sequence[Any]) -> Any:
+            return builder.inttoptr(arguments[0], context.get_value_type(signature.return_type))
 
-    pointer: Any = types.CPointer
-    return pointer(types.float64)(types.intp), generate
+        pointer: Any = types.CPointer
+        return pointer(kind)(types.intp), generate
+
+    return extending.intrinsic(convert)
 
 
-as_doubles: Any = extending.intrinsic(_as_doubles)
+as_doubles, as_ints = _as_pointer(_DOUBLE), _as_pointer(_INT)
 
 
 def client_handle(library: str, client: int) -> int:

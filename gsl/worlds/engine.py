@@ -15,9 +15,9 @@ from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant, hardness
 from gsl.core.scratch import Scratch
 from gsl.robots.urdf import principal_axes, urdf
-from gsl.worlds.base_frame import base_motion
+from gsl.worlds.base_frame import GYRO, PLACE, TURN, VELOCITY, fill_base_motion
 from gsl.worlds.bullet_c import NO_HANDLE, client_handle
-from gsl.worlds.control_period import Drive, first_memory, in_c, in_python, read_state
+from gsl.worlds.control_period import Drive, first_memory, in_c, in_python
 from gsl.worlds.ground import PLANE, lay
 from gsl.worlds.physics import Load, Physics, Reading
 from gsl.worlds.pushes import aim, apply_push, overlap
@@ -66,12 +66,13 @@ class Engine:
         apart, moved = servo.rows[ROTOR], physics.motors == "servo"
         armature = plant.servo.armature - apart if moved else np.zeros(len(apart))
         self._motors = None if moved else VelocityMotors.of(plant, servo.rows)
+        self._compiled = moved and not (plant.pushes or plant.hook)
         rotor = rotors(self.robot, armature, floating=physics.floating, apart=apart)
         self._loaded = _heavier(self.robot, carry_inertia(self.robot, rotor.carried))
         self._inertia = {name: principal_axes(link.inertia)[0].tolist() for name, link in self._loaded.links.items()}
         base = self._loaded.links[self.robot.base]
         axes = np.ascontiguousarray(principal_axes(base.inertia)[1])
-        self._drive, self._base_com = Drive.of(servo, rotor, axes), base.com
+        self._drive = Drive.of(servo, rotor, axes, base.com)
         self._senses_apart = senses_apart(servo)
         self._pushes = aim(plant, self._loaded)
         self._link_from_inertial = Rotation.from_matrix(axes.T).as_quat().tolist()
@@ -123,10 +124,10 @@ class Engine:
             b.resetJointState(self.body, joint, position, velocity, physicsClientId=client)
         turn = np.array(b.getMatrixFromQuaternion(reading.quaternion)).reshape(3, 3)
         spin = turn @ reading.gyro
-        centre = reading.velocity + np.cross(spin, turn @ self._base_com)
+        centre = reading.velocity + np.cross(spin, turn @ self._drive.base_com)
         if physics.floating and (spin.any() or centre.any()):
             b.resetBaseVelocity(self.body, centre.tolist(), spin.tolist(), client)
-        self._start(commands, clock)
+        self._start(reading.motion, commands, clock)
 
     def _begin(self, heights: np.ndarray | None, x: float, y: float) -> None:
         """Set up an empty world with its ground."""
@@ -141,7 +142,8 @@ class Engine:
         )
         b.setGravity(*self.plant.gravity.tolist(), physicsClientId=client)
         plane = f"{self._folder.name}/ground.urdf"
-        self._ground = lay(b, client, plane, self.plant.contact, heights, x, y) if physics.floating else ()
+        grounds = lay(b, client, plane, self.plant.contact, heights, x, y) if physics.floating else ()
+        self._grounds = np.array(grounds, dtype=np.int32)
 
     def run(self, targets: np.ndarray, load: np.ndarray | None = None) -> None:
         """Hold commands for one control period.
@@ -159,29 +161,28 @@ class Engine:
         if self._load is not None:
             times = memory.servo.clock[0] + np.arange(physics.substeps) * physics.step
             memory.load[:], memory.drag[:] = self._load.act(times), self._load.drag
-        rest = (physics.floating, physics.substeps, physics.step, physics.period, self._drive, memory, self._base_turn)
-        if self._motors is not None:
-            outside, steps = self._outside if self.plant.pushes else None, (physics.substeps, physics.step)
-            self._motors.run(self.bullet, self.client, self.body, self.joints, *steps, memory.servo, outside)
-        elif self.plant.pushes or self.plant.hook:
-            in_python(self.bullet, self.client, self.body, self.joints, *rest, self._outside)
-        elif self.handle == NO_HANDLE:
-            in_python(self.bullet, self.client, self.body, self.joints, *rest)
+        rest = physics.floating, physics.substeps, physics.step, physics.period, self._drive, memory
+        if self._compiled and self.handle != NO_HANDLE:
+            in_c(self.handle, self.body, self._places, *rest, self._feet, self._grounds)
         else:
-            in_c(self.handle, self.body, self._places, *rest)
+            outside = self._outside if self.plant.pushes or self.plant.hook else None
+            if self._motors is None:
+                in_python(self.bullet, self.client, self.body, self.joints, *rest, outside)
+            else:
+                steps = physics.substeps, physics.step
+                self._motors.run(self.bullet, self.client, self.body, self.joints, *steps, memory.servo, outside)
+            self._measure()
         if self._load is not None and self._motors is None:
             self._load.note(times, memory.path)
         memory.servo.clock[0] += physics.period
 
     def read(self) -> Reading:
-        """Measure the robot now, and remember its orientation for the next control period."""
-        motion, pose, speed = self._state()
-        base = base_motion(self._drive.base_axes, self._base_com, pose, speed)
-        self._base_turn = base.turn
-        still = (0, 0, 0)
-        turned = self.bullet.multiplyTransforms(still, pose[3:].tolist(), still, self._link_from_inertial)[1]
-        up = float(base.turn[2, 2])
-        return Reading(motion, base.place, turned, base.velocity, base.gyro, up, self._foot_force())
+        """Return what was measured of the robot at the end of the control period."""
+        memory, still = self._memory, (0, 0, 0)
+        frame, turned = memory.frame.copy(), memory.base[3:7].tolist()
+        quaternion = self.bullet.multiplyTransforms(still, turned, still, self._link_from_inertial)[1]
+        rest = frame[VELOCITY], frame[GYRO], float(frame[TURN][2, 2]), memory.feet.copy()
+        return Reading(memory.motion.copy(), frame[PLACE], quaternion, *rest)
 
     def encoders(self, reading: Reading) -> np.ndarray:
         """Return what the encoders tell of the motors' positions [rad] and velocities [rad/s], shape (2, n_motors)."""
@@ -198,25 +199,17 @@ class Engine:
                 apply_push(self.bullet, self.client, self.body, self.links, push, share)
         return np.zeros(len(self.joints)) if self.plant.hook is None else self.plant.hook(motion, time)
 
-    def _state(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the motion of the joints, and pose and velocity of the base's inertial frame: see `read_state`."""
-        motion, pose, speed = np.empty((2, len(self.joints))), np.empty(7), np.empty(6)
-        if self.handle != NO_HANDLE:
-            read_state(self.handle, self.body, self._places, motion, pose, speed)
-            return motion, pose, speed
-        b, body, client = self.bullet, self.body, self.client
-        motion[0], motion[1], _, _ = zip(*b.getJointStates(body, self.joints, client), strict=True)
-        pose[:3], pose[3:] = b.getBasePositionAndOrientation(body, client)
-        speed[:3], speed[3:] = b.getBaseVelocity(body, client)
-        return motion, pose, speed
-
-    def _foot_force(self) -> tuple[float, ...]:
-        force = dict.fromkeys(self._feet, 0.0)
-        for ground in self._ground:
-            for contact in self.bullet.getContactPoints(self.body, ground, physicsClientId=self.client):
-                if contact[3] in force:
-                    force[contact[3]] += contact[9]
-        return tuple(force.values())
+    def _measure(self) -> None:
+        """Fill in how the robot moves and what its feet bear, by pybullet."""
+        b, body, client, memory = self.bullet, self.body, self.client, self._memory
+        memory.motion[0], memory.motion[1], _, _ = zip(*b.getJointStates(body, self.joints, client), strict=True)
+        memory.base[:3], memory.base[3:7] = b.getBasePositionAndOrientation(body, client)
+        memory.base[7:10], memory.base[10:] = b.getBaseVelocity(body, client)
+        fill_base_motion(self._drive.base_axes, self._drive.base_com, memory.base, memory.frame)
+        memory.feet[:] = 0.0
+        for ground in self._grounds:
+            for contact in b.getContactPoints(body, int(ground), physicsClientId=client):
+                memory.feet[self._feet == contact[3]] += contact[9]
 
     def _set_dynamics(self) -> None:
         """Find the links by name; set true inertia, sole friction, and no damping that nobody asked for."""
@@ -226,7 +219,7 @@ class Engine:
         self._places = np.array([info[joints[name]][3:5] for name in self.robot.motors], dtype=np.int32).T.copy()
         self.links = {row[12].decode(): row[0] for row in info} | {self.robot.base: -1}
         self.joints = [joints[name] for name in self.robot.motors]
-        self._feet = [self.links[name] for name in self.robot.feet.values()]
+        self._feet = np.array([self.links[name] for name in self.robot.feet.values()], dtype=np.int32)
         for name, inertia in self._inertia.items():
             b.changeDynamics(
                 self.body,
@@ -239,14 +232,15 @@ class Engine:
                 physicsClientId=client,
             )
 
-    def _start(self, commands: np.ndarray, clock: float) -> None:
+    def _start(self, motion: np.ndarray, commands: np.ndarray, clock: float) -> None:
         """Release the default velocity motors and clear what the servos remember."""
         n = len(self.joints)
         self.bullet.setJointMotorControlArray(
             self.body, self.joints, self.bullet.VELOCITY_CONTROL, forces=[0.0] * n, physicsClientId=self.client
         )
         loads = self.physics.substeps if self.plant.torque_noise.any() or self._load is not None else 0
-        self._memory = first_memory(first_state(commands, self.read().motion, self.physics.step, clock), loads)
+        self._memory = first_memory(first_state(commands, motion, self.physics.step, clock), len(self._feet), loads)
+        self._measure()
 
 
 def _heavier(robot: Robot, extra: Mapping[str, np.ndarray]) -> Robot:

@@ -69,4 +69,4 @@ class Reading(NamedTuple):
     velocity: np.ndarray
     gyro: np.ndarray
     up: float
-    foot_force: tuple[float, ...]
+    foot_force: np.ndarray

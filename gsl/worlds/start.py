@@ -43,7 +43,7 @@ def resting(robot: Robot, positions: np.ndarray, targets: np.ndarray, *, floatin
     height = CLEARANCE - lowest_point(robot, positions) if floating else HELD_AT
     place, still = np.array([0.0, 0.0, height]), np.zeros(3)
     motion = np.array([positions, np.zeros(len(positions))])
-    return Start(Reading(motion, place, (0.0, 0.0, 0.0, 1.0), still, still, 1.0, ()), targets[None])
+    return Start(Reading(motion, place, (0.0, 0.0, 0.0, 1.0), still, still, 1.0, np.zeros(0)), targets[None])
 
 
 def lowest_point(robot: Robot, positions: np.ndarray, turn: np.ndarray | None = None) -> float:

@@ -144,7 +144,7 @@ def start_at(env: BulletEnv, seen: np.ndarray, actions: np.ndarray, row: int) ->
     layout, drive, at = env.layout, env.world.plant.robot.drive, seen[row]
     motion = np.array([at[layout["position"]][drive], at[layout["velocity"]][drive]])
     place, turn, speed = (at[layout[f"base.{part}"]] for part in ("position", "orientation", "velocity"))
-    reading = Reading(motion, place, tuple(turn), speed, at[layout["gyro"]], 1.0, ())
+    reading = Reading(motion, place, tuple(turn), speed, at[layout["gyro"]], 1.0, np.zeros(0))
     return Start(reading, actions[row - 1 :: -1][:, drive])
 
 

@@ -98,7 +98,7 @@ def _replay_window(engine: Engine, window: OnGround, height: float, joints: int)
     base, motion = window.base, window.motion
     place = np.array([base[0], base[1], height])
     lifted = base[2] - height  # where the log's ground is
-    start = Reading(motion, place, tuple(base[6:10].tolist()), base[10:13], base[13:16], 1.0, ())
+    start = Reading(motion, place, tuple(base[6:10].tolist()), base[10:13], base[13:16], 1.0, np.zeros(0))
     engine.load(start, window.commands[length:], float(window.clock))
     rows, yaw = [], float(base[5])
     for t in range(length):
