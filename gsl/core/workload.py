@@ -183,6 +183,7 @@ class Workload:
         """Return how long the rest takes [s], None if that cannot be said yet.
 
         The first step that was worked does not count: its time is that of compilation, and of workers that start.
+        A part that takes longer than planned leaves the time of the parts after it as it is.
         """
         seconds = self._plans[0].seconds if self._plans else 0.0
         prior = PRIOR if seconds else 0.0
@@ -190,7 +191,15 @@ class Workload:
         if weight <= 0.0:
             return None
         whole = (self._last - self._begun + prior * seconds) / weight
-        return max(0.0, whole * (1.0 - self._share) - (self.clock() - self._last))
+        passed = min(self.clock() - self._last, whole * (self._end() - self._share))
+        return max(0.0, whole * (1.0 - self._share) - passed)
+
+    def _end(self) -> float:
+        """Return how much of all is done at the end of the present part."""
+        inside = 1.0
+        for plan in reversed(self._plans):
+            inside = plan.share(inside) if plan.parts else inside
+        return max(inside, self._share)
 
     def text(self) -> str:
         """Return in a line where the work is, how much is done, how fast it goes and what has come out."""

@@ -82,6 +82,16 @@ def test_the_time_left_is_that_of_the_plan_until_the_clock_knows_better() -> Non
         assert load.left() == 0.0 and "left" not in load.text()
 
 
+def test_a_part_that_takes_longer_than_planned_takes_nothing_from_those_after_it() -> None:
+    load, clock, _ = work()
+    with load.plan("stage", [Part(10.0), Part(20.0), Part(30.0)]):
+        load.finish()
+        clock.now = 15.0
+        assert load.left() == pytest.approx(35.0)
+        clock.now = 90.0
+        assert load.left() == pytest.approx(30.0)
+
+
 def test_what_was_done_before_is_no_pace() -> None:
     load, clock, _ = work()
     with load.loop(100, "walking") as loop:
