@@ -25,7 +25,7 @@ from yaml import YAMLError
 from gsl.commandline.config_errors import Vocabulary, misshapen, translate, unfit, unknown_key
 from gsl.commandline.known_settings import list_keys, plain, read_declared, read_parts
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
-from gsl.commandline.own_word import check_own_word, find_own_modules, find_trust
+from gsl.commandline.own_word import check_own_word, check_servos, find_own_modules, find_trust
 from gsl.commandline.plugins import folders, packages
 from gsl.commandline.yaml_files import USER, BudgetedFiles, check_folder, load_plugins
 from gsl.core.budget import within
@@ -129,6 +129,7 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
     _check_made(command, composition)
     values = plain(composition.config)
     check_own_word(values, {key_of(word) for word in arguments})
+    check_servos(composition.config, arguments, OtherConfiguration.folder)
     strangers = values.keys() - read_declared(values).keys() - base.keys() - {*COMMAND_KEYS}
     if misfit := unfit(command, arguments, min(strangers, default=None)):
         raise misfit

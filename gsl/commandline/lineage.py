@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from gsl.core.visible import visible
+from gsl.core.words import several
 from gsl.errors import ArtifactError
 from gsl.report.console import Console
 from gsl.storage.hashing import SHORT
@@ -26,7 +27,7 @@ def verify(reference: str | None, console: Console) -> int:
     Raises:
         ArtifactError: There is no such artifact.
     """
-    wrong: dict[Path, Ancestor] = {}
+    wrong, above = dict[Path, Ancestor](), set[Path]()
     seen: Seen = {}
     folders = artifact_folders(reference)
     if not folders:
@@ -34,13 +35,16 @@ def verify(reference: str | None, console: Console) -> int:
     with console.progress(len(folders), "verifying artifacts") as progress:
         for folder in folders:
             for node in lineage(folder, seen).all():
+                above.add(node.place.absolute())
                 if node.problem:
                     wrong.setdefault(node.place, node)
             progress.advance()
     problems = {place.as_posix(): "; ".join(filter(None, [node.problem, node.remedy])) for place, node in wrong.items()}
-    document = {"artifacts": len(folders), "problems": problems}
+    ancestors = len(above - {folder.absolute() for folder in folders})
+    document = {"artifacts": len(folders), "ancestors": ancestors, "problems": problems}
     if not wrong:
-        console.result(document, text=f"{len(folders)} of {len(folders)} artifacts are as they were made")
+        more = f", and {several(ancestors, 'ancestor')} too" if ancestors else ""
+        console.result(document, text=f"{len(folders)} of {len(folders)} artifacts are as they were made{more}")
         return 0
     if console.json:
         console.result({**document, "exit_code": 1})
@@ -48,7 +52,7 @@ def verify(reference: str | None, console: Console) -> int:
     whole = all(node.absent for node in wrong.values())
     first, *others = sorted(wrong.values(), key=lambda node: node.absent)
     for other in others:
-        console.status(f"{other.place.as_posix()}: {other.problem}")
+        console.status(_describe(other))
     return console.error(_describe(first, "all that is here is whole" if whole else ""), 1, command="gsl verify")
 
 

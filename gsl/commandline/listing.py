@@ -23,7 +23,7 @@ from gsl.report.headline import headline
 from gsl.storage.artifact import Artifact
 from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.identity import content_hash
-from gsl.storage.lineage import out_of_date
+from gsl.storage.lineage import REFRESH, out_of_date
 from gsl.storage.manifest import (
     Manifest,
     Parent,
@@ -107,6 +107,8 @@ def show_artifact(reference: str, console: Console) -> int:
     if strange := next(strange_files(folder, artifact.manifest), None):
         state += f"; {strange} is no file of it"
     console.table("files", ["file", "size", "sha256"], files, state)
+    if stale := out_of_date(folder):
+        console.status(f"warning: {stale}; {REFRESH}")
     if damaged is None:
         return 0
     return console.error(str(damage(folder, damaged)), 1, command="gsl show")

@@ -7,15 +7,21 @@ import re
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from importlib.machinery import PathFinder
+from pathlib import Path
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import ChoiceSweep, QuotedString
 from hydra.errors import HydraException
+from omegaconf import DictConfig, OmegaConf
+from omegaconf.errors import OmegaConfBaseException
 
+from gsl.commandline.known_settings import list_keys
 from gsl.core.likeness import find_alike
 from gsl.core.trust import TRUST, modules_in
 from gsl.errors import ConfigError
+from gsl.models.servo_file import servo_file
+from gsl.storage.references import RUNS
 
 VARIABLE = "GSL_TRUST"
 ALIKE = 0.75  # trsut is trust; trial is not
@@ -90,6 +96,29 @@ def check_own_word(values: Mapping[str, Any], typed: Collection[str]) -> None:
     for key, usual in _USUAL.items():
         if key not in typed and not usual.fullmatch(value := str(values.get(key, ""))):
             raise ConfigError(key, f"is said by a file, and only you can say it: type {key}=...", given=value)
+
+
+def check_servos(config: DictConfig, arguments: Sequence[str], folder: Path | None) -> None:
+    """Refuse a learned servo that a file of settings names and that lies in none of its own or the user's places.
+
+    Args:
+        config: All settings of a command.
+        arguments: What the user has typed, which may name any place.
+        folder: Of the user's yaml files, if there is one.
+
+    Raises:
+        ConfigError: There is one.
+    """
+    places = [place.resolve() for place in (Path.cwd(), RUNS, folder or RUNS)]
+    for key in (key for key in list_keys(config) if key.rpartition(".")[2] == "servo"):
+        try:
+            value = OmegaConf.select(config, key)
+            file = servo_file(value).resolve() if isinstance(value, str) and value else None
+        except (ConfigError, OmegaConfBaseException):  # there is none, which is told in its time
+            continue
+        if file and not any(map(file.is_relative_to, places)) and not any(value in word for word in arguments):
+            problem = f"is named by a file and leads out of its folder and of yours; if you want it, type {key}=..."
+            raise ConfigError(key, problem, given=value)
 
 
 def find_own_modules(trust: Collection[str]) -> None:

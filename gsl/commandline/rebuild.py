@@ -11,7 +11,7 @@ from gsl.core.described import restore
 from gsl.errors import ArtifactError
 from gsl.storage.artifact import CONFIG, Artifact
 from gsl.storage.identity import content_hash
-from gsl.storage.lineage import COPY, absence
+from gsl.storage.lineage import COPY, REPEAT, absence
 
 
 def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, Any]]:
@@ -31,7 +31,7 @@ def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, An
         if not source.exists():
             raise ArtifactError(source, f"{absence(artifact.folder)}; {COPY}")
         if content_hash(source) != parent.hash:
-            raise ArtifactError(source, f"is no longer what {artifact.folder.as_posix()} was made from")
+            raise ArtifactError(source, f"is no longer what {artifact.folder.as_posix()} was made from; {REPEAT}")
         _move(config, parent.role.split("."), source)
     stage = restore(config, trust=trust)
     if not (hasattr(stage, "parents") and hasattr(stage, "run")):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from gsl.commandline.own_word import find_own_modules
-from gsl.core.budget import is_plain
+from gsl.core.budget import holds
 from gsl.core.trust import modules_in
 from gsl.errors import InputError
 from gsl.report.console import Console
@@ -56,7 +56,7 @@ def write_robot(name: str, folder: Path, console: Console) -> None:
 
 def _check_free(model: Path, picture: Path | None, text: str) -> None:
     """Refuse to write over what is not of this robot: the same URDF, with a picture beside it, is written again."""
-    again = is_plain(model) and not model.is_symlink() and model.read_bytes() == text.encode()
+    again = not model.is_symlink() and holds(model, text.encode())
     taken = [path for path in (model, picture) if path is not None and (path.exists() or path.is_symlink())]
     if taken and not again or picture is not None and picture.is_symlink():
         raise InputError(f"{taken[0]}: exists, and is not what would be written; move it, or say another out=")

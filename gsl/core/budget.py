@@ -6,6 +6,7 @@ The limits are far above what gsl or a log of a robot needs, and far below what 
 from __future__ import annotations
 
 import errno
+import io
 import json
 import math
 import os
@@ -53,40 +54,79 @@ SECONDS = 10.0
 GROWTH = 1_500_000_000
 """Bytes by which the process may grow meanwhile."""
 _KERNEL = ("/proc/", "/sys/")  # folders of files that the kernel makes up
+_KERNEL_TYPES = frozenset(  # of their file systems, which can be mounted elsewhere as well
+    ("proc", "sysfs", "cgroup", "cgroup2", "debugfs", "tracefs", "securityfs", "configfs", "pstore", "bpf", "efivarfs")
+    + ("binfmt_misc", "fusectl", "nsfs", "selinuxfs", "smackfs", "resctrl", "nfsd", "rpc_pipefs", "functionfs")
+)
+_NOT_PLAIN = "is no plain file; copy what it holds into one"
 _TICK = 0.05  # of CPU between two looks at what was taken [s]
 
 
 def check_file(path: Path, most: float = math.inf) -> None:
-    """Refuse what is no plain file, or larger than allowed [bytes].
+    """Refuse what is no plain file, or larger than allowed [bytes]; readers of ours call `open_file`.
 
     A device or a pipe may never end, and so may a file of the kernel, such as /proc/kmsg, though it is called plain.
+    Libraries that open a path themselves (h5py, safetensors, rosbags, torch) may find another file there by then.
+    Its identity is not compared, for hashes are: a stage hashes what it reads before and after its work.
 
     Raises:
         InputError: It says which.
         OSError: There is no such file, it is a folder, or it cannot be looked at.
     """
-    about = path.stat()
+    _check(path, path.stat(), most)
+    if os.path.realpath(path).startswith(_KERNEL):  # may lead to a device that is mounted for another process alone
+        raise InputError(f"{path}: {_NOT_PLAIN}")
+
+
+def _check(path: Path, about: os.stat_result, most: float) -> None:
     if stat.S_ISDIR(about.st_mode):
         raise IsADirectoryError(errno.EISDIR, "is a folder", str(path))
-    if not stat.S_ISREG(about.st_mode) or about.st_dev in _kernels() or os.path.realpath(path).startswith(_KERNEL):
-        raise InputError(f"{path}: is no plain file")
+    if not stat.S_ISREG(about.st_mode) or _is_kernels(about.st_dev):
+        raise InputError(f"{path}: {_NOT_PLAIN}")
     if about.st_size > most:
         raise InputError(f"{path}: has {about.st_size:,} bytes; {most:,.0f} are read at most")
 
 
 @cache
-def _kernels() -> frozenset[int]:
-    """Return the devices of the kernel's file systems, which can be mounted elsewhere as well."""
-    return frozenset(os.stat(place).st_dev for place in _KERNEL if os.path.ismount(place))
-
-
-def is_plain(path: Path) -> bool:
-    """Whether there is a file that can be read to its end."""
+def _is_kernels(device: int) -> bool:
+    """Whether the kernel makes up the files of a device, wherever that is mounted."""
     try:
-        check_file(path)
+        mounts = Path("/proc/self/mountinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return False
+    number = f"{os.major(device)}:{os.minor(device)}"
+    halves = (line.partition(" - ") for line in mounts)  # before: numbers and places; behind: the file system
+    return any(place.split()[2] == number and kind.split()[0] in _KERNEL_TYPES for place, _, kind in halves)
+
+
+def open_file(path: Path, most: float = math.inf) -> io.BufferedReader:
+    """Open a plain file, which is checked before and again once it is open: what was checked is what is read.
+
+    Raises:
+        InputError: It is no plain file, or too large.
+        OSError: There is no such file, or it cannot be opened.
+    """
+    check_file(path, most)  # first, for to open a device may be enough to set it going
+    file = open(path, "rb", opener=_open_at_once)  # noqa: SIM115  the caller closes it
+    try:
+        _check(path, os.fstat(file.fileno()), most)
+    except BaseException:
+        file.close()
+        raise
+    return file
+
+
+def _open_at_once(path: str, flags: int) -> int:
+    return os.open(path, flags | getattr(os, "O_NONBLOCK", 0))  # a pipe in place of the file keeps nobody waiting
+
+
+def holds(path: Path, content: bytes) -> bool:
+    """Whether there is a plain file with just that content."""
+    try:
+        with open_file(path, len(content)) as file:
+            return file.read() == content
     except (OSError, InputError):
         return False
-    return True
 
 
 def read_text(path: Path, most: float = TEXT_BYTES) -> str:
@@ -96,8 +136,8 @@ def read_text(path: Path, most: float = TEXT_BYTES) -> str:
         InputError: It cannot be read, is too large, or is no text in UTF-8.
     """
     try:
-        check_file(path, most)
-        return path.read_text(encoding="utf-8-sig")
+        with open_file(path, most) as file:
+            return io.TextIOWrapper(file, encoding="utf-8-sig").read()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
@@ -130,8 +170,8 @@ def read_json(path: Path, most: float = DOCUMENT_BYTES) -> Any:
         ValueError: It is no JSON, or damaged.
         InputError: It is no plain file, or too large.
     """
-    check_file(path, most)
-    return parse_json(path.read_text(encoding="utf-8"))
+    with open_file(path, most) as file:
+        return parse_json(file.read().decode())
 
 
 @contextmanager

@@ -8,11 +8,11 @@ import zipfile
 import zlib
 from dataclasses import field
 from pathlib import Path
-from typing import Annotated, Any
+from typing import IO, Annotated, Any
 
 import numpy as np
 
-from gsl.core.budget import NETWORK_BYTES
+from gsl.core.budget import NETWORK_BYTES, open_file
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError
 from gsl.policies.outside import File, Joints, Network, OutsideFile, Ports, read_once
@@ -48,13 +48,14 @@ class TorchScript:
     def __init__(self, path: Path) -> None:
         import torch
 
-        check_program(path)
         try:
             load: Any = torch.jit.load
-            with warnings.catch_warnings():  # of torch, which would like torch.export
-                warnings.simplefilter("ignore")
-                self._module: Any = load(str(path), map_location="cpu").eval()
-        except (RuntimeError, ValueError) as error:
+            with open_file(path, NETWORK_BYTES) as file, warnings.catch_warnings():
+                check_program(path, file)
+                file.seek(0)
+                warnings.simplefilter("ignore")  # of torch, which would like torch.export
+                self._module: Any = load(file, map_location="cpu").eval()
+        except (RuntimeError, ValueError, OSError) as error:
             advice = "write it with torch.jit.script(module).save(file)"
             raise ConfigError(
                 "policy.file", f"is no TorchScript: {_first_line(error)}; {advice}", given=str(path)
@@ -89,7 +90,7 @@ class TorchScript:
             return np.asarray((outputs[0] if isinstance(outputs, tuple) else outputs).numpy())
 
 
-def check_program(path: Path) -> None:
+def check_program(path: Path, file: IO[bytes]) -> None:
     """Refuse a file whose program can write files, reach other machines or print: operations that no policy needs.
 
     Every file of its source is searched for their names, before any of it is loaded.
@@ -98,7 +99,7 @@ def check_program(path: Path) -> None:
         ConfigError: It names one of them, or is no such file.
     """
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(file) as archive:
             entries = archive.infolist()
             if sum(entry.file_size for entry in entries) > NETWORK_BYTES:
                 problem = f"unpacks to more than {NETWORK_BYTES / 1e9:g} GB; no policy is as large"

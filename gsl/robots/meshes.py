@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from gsl.core.body import MESH, Robot, Shape
-from gsl.core.budget import MESH_BYTES, TEXT_BYTES, check_file, within
+from gsl.core.budget import MESH_BYTES, TEXT_BYTES, open_file, within
 from gsl.errors import InputError
 from gsl.robots.frames import euler
 
@@ -108,7 +108,6 @@ def write_stl(path: Path, part: Part) -> None:
 
 def _read(file: Path) -> tuple[Part, ...]:
     try:
-        check_file(file, MESH_BYTES)
         return _load(file, file.stat().st_mtime_ns)
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}") from error
@@ -119,7 +118,8 @@ def _load(file: Path, changed: int) -> tuple[Part, ...]:
     """Return what is in a file; one that was changed is read again."""
     import trimesh
 
-    data = file.read_bytes()
+    with open_file(file, MESH_BYTES) as source:
+        data = source.read()
     try:
         if file.suffix.lower() == ".dae" and b"<!ENTITY" in data:
             raise ValueError("it defines entities, which no mesh needs")
@@ -167,10 +167,10 @@ class _Materials(Mapping[str, bytes]):
         if path.suffix.lower() != ".mtl" or not path.is_file() or path.resolve().parent != self._folder.resolve():
             raise KeyError(name)
         try:
-            check_file(path, TEXT_BYTES)
+            with open_file(path, TEXT_BYTES) as file:
+                return file.read()
         except InputError as error:
             raise KeyError(name) from error
-        return path.read_bytes()
 
     def get(self, name: str, default: Any = None) -> Any:
         """As the mapping says; trimesh calls this one for textures too, of which there are none."""

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from gsl.core.body import Link
-from gsl.core.budget import JOINTS, URDF_BYTES, check_file, within
+from gsl.core.budget import JOINTS, URDF_BYTES, open_file, within
 from gsl.core.validation import did_you_mean
 from gsl.errors import InputError
 from gsl.robots.joint_limits import ENDS
@@ -115,9 +115,8 @@ def read_description(path: Path, *, hulls: bool = False) -> Description:
 
 def _root(path: Path) -> xml.Element:
     try:
-        check_file(path, URDF_BYTES)
-        with within(f"{path}: reading it"):
-            root = xml.parse(path).getroot()
+        with open_file(path, URDF_BYTES) as file, within(f"{path}: reading it"):
+            root = xml.parse(file).getroot()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except (xml.ParseError, ValueError, LookupError) as error:

@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
-from gsl.core.budget import ARTIFACT_BYTES, DOCUMENT_BYTES, check_file
+from gsl.core.budget import ARTIFACT_BYTES, DOCUMENT_BYTES, open_file
 from gsl.errors import ArtifactError
 
 ANSWER, RETURNS = "answer.csv", "returns.csv"
@@ -26,9 +26,8 @@ def read_mark(path: Path) -> str:
     Raises:
         InputError: It is no plain file, or too large.
     """
-    check_file(path, ARTIFACT_BYTES)
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        first = file.readline(200)
+    with open_file(path, ARTIFACT_BYTES) as file:
+        first = file.readline(200).decode("utf-8-sig", errors="replace")
     return first.removeprefix(MARK).strip() if first.startswith(MARK) else ""
 
 
@@ -95,8 +94,7 @@ def table(path: Path) -> tuple[list[str], list[dict[str, str]]]:
     Raises:
         InputError: It is no plain file, too large, or no table.
     """
-    check_file(path, DOCUMENT_BYTES)
-    with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
+    with io.TextIOWrapper(open_file(path, DOCUMENT_BYTES), "utf-8-sig", errors="replace", newline="") as file:
         read = csv.DictReader((line for line in file if not line.startswith("#")), restkey="", restval="")
         try:
             columns = [name.strip() for name in read.fieldnames or ()]

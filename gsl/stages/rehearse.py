@@ -14,7 +14,7 @@ from typing import Annotated, Any, ClassVar
 import gymnasium
 import numpy as np
 
-from gsl.core.budget import is_plain
+from gsl.core.budget import holds
 from gsl.core.console import Console, Progress
 from gsl.core.interfaces import World
 from gsl.core.layout import Layout
@@ -164,5 +164,5 @@ def _check_runner(folder: Path, request: Mapping[str, Any]) -> None:
             raise ArtifactError(path, "is none of gsl's modules, and is not run here; take it away")
     for name, content in files.items():
         path = folder / name
-        if not is_plain(path) or path.read_bytes() != content:
+        if not holds(path, content):
             raise ArtifactError(path, "is not what this gsl writes, and is not run here; make the request anew")

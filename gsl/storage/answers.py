@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.budget import COLUMNS, find_repeat
+from gsl.core.budget import COLUMNS, find_repeat, open_file
 from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError, TrajectoryError
-from gsl.runner.journal import MARK, YES, read_mark, table
+from gsl.runner.journal import YES, read_mark, table
 from gsl.runner.request import layout_of
 from gsl.runner.senses import BODY, JOINTS
 from gsl.storage import trajectories
@@ -251,10 +251,11 @@ def _csv_columns(path: Path, request: Mapping[str, Any]) -> dict[str, np.ndarray
     if path.stat().st_size > most:
         size, needed = (f"{count / 1e6:,.0f} MB" for count in (path.stat().st_size, most))
         raise ArtifactError(path, f"is {size}, but what was asked for needs less than {needed}; is it the right file?")
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        above = sum(1 for _ in itertools.takewhile(lambda line: line.startswith(("#", MARK)), file))
     try:
-        table = pc.read_csv(path, read_options=pc.ReadOptions(skip_rows=above))
+        with open_file(path) as file:
+            above = sum(1 for _ in itertools.takewhile(lambda line: line.startswith((b"#", b"\xef\xbb\xbf#")), file))
+            file.seek(0)
+            table = pc.read_csv(file, read_options=pc.ReadOptions(skip_rows=above))
     except (pa.ArrowException, OSError, UnicodeDecodeError) as error:
         raise TrajectoryError(path, f"is no CSV file with a row of names: {' '.join(str(error).split())}") from error
     if len(table.column_names) > COLUMNS:

@@ -27,7 +27,7 @@ from gsl.effects.effect import own
 from gsl.errors import ArtifactError, GslError, InputError
 from gsl.storage import documents, manifest
 from gsl.storage.identity import Identity, changes, content_hash, identify
-from gsl.storage.lineage import broken_link, out_of_date
+from gsl.storage.lineage import REFRESH, broken_link, out_of_date
 from gsl.storage.manifest import Manifest, Parent
 from gsl.storage.origin import Origin, at_work, relative
 from gsl.storage.read_files import own_effects, read_files
@@ -126,7 +126,7 @@ def build(
     package, made = package_of(type(stage)), getattr(stage, "makes", ())
     identity = identify(stage.kind, config, sources, package, made=made)
     for stale in filter(None, map(out_of_date, sources.values())):
-        console.status(f"warning: {stale}; the same commands with force=true bring it up to date")
+        console.status(f"warning: {stale}; {REFRESH}")
     with hold_lock(out), stoppable(), explain_failures(out.parent):
         forced = getattr(stage, "forced", "rebuilds it")
         if (existing := _existing(out, identity, config, force=force, forced=forced)) is not None:

@@ -7,7 +7,7 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from gsl.core.budget import ARTIFACT_BYTES, check_file
+from gsl.core.budget import ARTIFACT_BYTES, open_file
 
 PACKAGE = Path(__file__).parents[1]
 SHORT = 12
@@ -24,8 +24,7 @@ def file_hash(path: Path) -> str:
     Raises:
         InputError: It is no plain file, or too large.
     """
-    check_file(path, ARTIFACT_BYTES)
-    with path.open("rb") as file:
+    with open_file(path, ARTIFACT_BYTES) as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 

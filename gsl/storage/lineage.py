@@ -16,6 +16,7 @@ from gsl.storage.manifest import Manifest, Parent
 LONGEST = 200
 """Generations of a lineage, of which an iteration adds less than ten."""
 COPY = "copy it to this place"
+REFRESH = "the same commands with force=true bring it up to date"
 REPEAT = "the same commands with force=true bring what was made from it up to date"
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from gsl.core.budget import DOCUMENT_BYTES, check_file
+from gsl.core.budget import DOCUMENT_BYTES, open_file
 from gsl.core.visible import visible
 from gsl.errors import InputError
 from gsl.storage.hashing import LOG
@@ -63,8 +63,8 @@ class Origin:
 def _read_log(path: Path) -> str:
     """Return a log, or nothing of one that cannot be read: no work fails because of what it says of itself."""
     try:
-        check_file(path, DOCUMENT_BYTES)
-        return path.read_text(encoding="utf-8", errors="replace")
+        with open_file(path, DOCUMENT_BYTES) as file:
+            return file.read().decode(errors="replace")
     except (InputError, OSError):
         return ""
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-from gsl.core.budget import ARTIFACT_BYTES, check_file
+from gsl.core.budget import ARTIFACT_BYTES, open_file
 from gsl.storage.whole import flush
 
 CHAIN = "chain"
@@ -30,10 +30,10 @@ class Records:
     def __init__(self, path: Path, say: Callable[[str], None]) -> None:
         self._path, self._chain = path, ""
         self.records: list[dict[str, Any]] = []
+        stored, good = b"", 0
         if path.exists():
-            check_file(path, ARTIFACT_BYTES)
-        stored = path.read_bytes() if path.exists() else b""
-        good = 0
+            with open_file(path, ARTIFACT_BYTES) as file:
+                stored = file.read()
         for line in stored.splitlines(keepends=True):
             if (record := self._parse(line)) is None:
                 break

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gsl.core.budget import is_plain
+from gsl.core.budget import holds
 from gsl.core.trust import modules_in
 from gsl.errors import ArtifactError
 from gsl.runner.request import NAME, SCHEMA_VERSION, hash_of, read_stored
@@ -127,7 +127,7 @@ def _check_ours(folder: Path, new: Path) -> None:
         return
     for path in (path for path in sorted(new.rglob("*")) if path.is_file() and path.name != ROBOT):
         old = folder / path.relative_to(new)
-        if old.exists() and not (is_plain(old) and old.read_bytes() == path.read_bytes()):
+        if old.exists() and not holds(old, path.read_bytes()):
             raise ArtifactError(old, "is in the way of a request, and not gsl's; move it, or choose another folder")
 
 

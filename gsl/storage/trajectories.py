@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from gsl.core.budget import ARTIFACT_BYTES, check_file, parse_json
+from gsl.core.budget import ARTIFACT_BYTES, open_file, parse_json
 from gsl.core.trajectory import Batch
 from gsl.errors import TrajectoryError
 from gsl.storage import documents
@@ -96,9 +96,8 @@ def _table(path: Path) -> pa.Table:
         raise TrajectoryError(path, "is a folder; give the parquet file in it")
     if not path.exists():
         raise TrajectoryError(path, "does not exist")
-    check_file(path, ARTIFACT_BYTES)
     try:
-        with pq.ParquetFile(path, page_checksum_verification=True) as file:
+        with open_file(path, ARTIFACT_BYTES) as source, pq.ParquetFile(source, page_checksum_verification=True) as file:
             check_declared(path, file.metadata)
             return file.read()
     except (pa.ArrowException, OSError) as error:

@@ -14,7 +14,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from gsl.core.budget import is_plain
+from gsl.core.budget import holds
 from gsl.errors import ArtifactError
 from gsl.storage.hashing import LOG, STEPS
 from gsl.storage.whole import claim, exchange, explain_refusal, flush, remove_temporary
@@ -87,7 +87,7 @@ def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ())
     with explain_refusal(out.parent):
         if folder.is_symlink():
             folder.unlink()
-        if folder.exists() and not (is_plain(folder / KEY) and (folder / KEY).read_bytes() == key.encode()):
+        if folder.exists() and not holds(folder / KEY, key.encode()):
             shutil.rmtree(folder)
         folder.mkdir(exist_ok=True)
         _clear(folder, {progress, KEY, LOG, STEPS, *kept})

@@ -20,7 +20,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
 from gsl.storage.hashing import file_hash
-from gsl.storage.lineage import LONGEST
+from gsl.storage.lineage import COPY, LONGEST, REPEAT
 from gsl.storage.trajectories import write
 
 pytestmark = pytest.mark.slow
@@ -186,6 +186,17 @@ def test_a_parent_of_terabytes_is_not_hashed(artifact: Path, tmp_path: Path) -> 
     for words in (("verify", "a"), ("lineage", "a"), ("show", "a"), ("rerun", "a")):
         said = gsl(*words, folder=tmp_path)
         assert "internal error" not in said.err and said.code in (0, 1, 2)
+
+
+def test_every_wrong_parent_of_a_forged_manifest_comes_with_what_to_do(artifact: Path, tmp_path: Path) -> None:
+    plain = "is no plain file; copy what it holds into one"
+    paths = ("/proc/version", "/etc/passwd", "../../../elsewhere")
+    seal(artifact, parents=[{"role": path, "path": path, "hash": "0" * 64} for path in paths])
+    said = gsl("verify", "a", folder=tmp_path)
+    assert (said.code, len(said.lines)) == (1, len(paths))
+    for line in said.lines:
+        assert any(remedy in line for remedy in (plain, REPEAT, COPY)), line
+    assert plain in gsl("rerun", "a", folder=tmp_path).err
 
 
 @pytest.mark.parametrize("kind", ["a pipe", "a device", "gigabytes", "deep"])

@@ -70,9 +70,12 @@ def test_verify_names_what_is_wrong_however_far_back(damage: str, run: Path) -> 
 
 
 def test_verify_finds_nothing_wrong_where_nothing_is(chain: Path) -> None:
-    assert done("verify", "chain/evaluate", folder=chain).out == "1 of 1 artifacts are as they were made\n"
+    assert done("verify", "chain/evaluate", folder=chain).out == (
+        "1 of 1 artifacts are as they were made, and 5 ancestors too\n"
+    )
     assert done("verify", "chain", folder=chain).out == "6 of 6 artifacts are as they were made\n"
-    assert json.loads(done("verify", "chain", "--json", folder=chain).out) == {"artifacts": 6, "problems": {}}
+    said = json.loads(done("verify", "chain", "--json", folder=chain).out)
+    assert said == {"artifacts": 6, "ancestors": 0, "problems": {}}
 
 
 def test_verify_of_all_runs_goes_on_after_the_first_problem(run: Path) -> None:
@@ -163,6 +166,7 @@ def test_who_uses_what_was_made_from_other_data_is_warned(run: Path) -> None:
     assert "(unchanged)" in said.out
     [line] = [line for line in said.lines if "warning" in line]
     assert "runs/chain/collect_sim was built anew since runs/chain/train_inverse was made from it" in line
+    assert [line] == done("show", "chain/train_inverse", folder=run).lines
 
 
 def test_verify_says_what_is_missing_and_needs_something_to_verify(run: Path, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import strangers
-from commands import ENVIRONMENT, done, gsl, refused
+from commands import ENVIRONMENT, SMALL, done, gsl, refused
 
 from gsl.core.budget import DEPTH, within
 from gsl.core.trust import check_code, code_in, modules_in
@@ -490,3 +490,26 @@ def test_a_yaml_file_is_read_as_it_is(tmp_path: Path) -> None:
 def test_settings_of_hydra_of_another_kind_are_one_line(tmp_path: Path) -> None:
     said = gsl("collect", "--cfg", "job", *["hydra.sweeper.params={_target_: os.system}"] * 2, folder=tmp_path)
     assert said.code == 2 and len(said.lines) == 1 and "hydra: its settings cannot be read" in said.lines[0]
+
+
+def test_a_world_of_a_stranger_takes_a_servo_of_its_own_place_or_the_users_alone(tmp_path: Path) -> None:
+    here = tmp_path / "here"
+    world = here / "theirs/world/w.yaml"
+    world.parent.mkdir(parents=True)
+    for place in (tmp_path / "elsewhere", here / "theirs/air", here / "runs/air"):
+        place.mkdir(parents=True)
+        (place / "servo_model.safetensors").touch()
+    (here / "runs/link").symlink_to(tmp_path / "elsewhere")
+    words = ("collect", "--config-dir=theirs", "world=w", *SMALL)
+    out, damaged = "is named by a file and leads out of its folder and of yours", "is not a checkpoint"
+    for servo, typed, problem in (
+        (str(tmp_path / "elsewhere"), (), out),
+        ("../elsewhere", (), out),
+        ("link", (), out),
+        ("${name}", ("name=link",), damaged),
+        ("../elsewhere", ("world.servo=../elsewhere",), damaged),
+        ("theirs/air", (), damaged),
+        ("air", (), damaged),
+    ):
+        world.write_text(f"defaults: [learned, _self_]\nservo: {servo}\n")
+        assert problem in refused(*words, *typed, folder=here), (servo, typed)

@@ -271,7 +271,8 @@ def test_a_program_that_could_reach_files_is_refused_before_it_is_loaded(line: s
     torch = pytest.importorskip("torch")
     layers = torch.nn.Sequential(torch.nn.Linear(3, 4), torch.nn.Sequential(torch.nn.ELU()), torch.nn.LSTM(4, 2))
     torch.jit.script(layers).save(str(tmp_path / "good.pt"))
-    check_program(tmp_path / "good.pt")
+    with (tmp_path / "good.pt").open("rb") as file:
+        check_program(tmp_path / "good.pt", file)
     with zipfile.ZipFile(tmp_path / "good.pt") as good, zipfile.ZipFile(tmp_path / "bad.pt", "w") as bad:
         for entry in good.infolist():
             bad.writestr(entry.filename, good.read(entry))

@@ -161,6 +161,19 @@ def test_commands_that_are_copies_of_positions_are_told(tmp_path: Path, rows: in
     assert f"action.shoulder, action.elbow: is a copy of the measured position {words}" in said.out
 
 
+def test_what_no_file_of_trajectories_holds_is_named_in_the_log_itself(tmp_path: Path) -> None:
+    jump = {name: values * (1.0 if name == "t" else 1.4e12) for name, values in plain().items()}
+    for columns, words in (
+        (changed("goal_elbow", at(20, 1e30))(plain()), "column action.elbow: is 1e+30 0.2 s after the start of log,"),
+        (jump, "column velocity.shoulder: is "),
+    ):
+        source, settings = csv(tmp_path / "log.csv", columns), mapping(tmp_path / "m.yaml")
+        line = refused("import", f"source={source}", settings, "accept=true", folder=tmp_path)
+        assert f"log.csv, {words}" in line
+        said = gsl("import", f"source={source}", settings, "accept=true", "--check", folder=tmp_path)
+        assert (said.code, words in said.out) == (2, True)
+
+
 def test_a_stamp_that_comes_twice_can_be_dropped(tmp_path: Path) -> None:
     source = csv(tmp_path / "log.csv", stuck(plain()))
     said = gsl("import", f"source={source}", mapping(tmp_path / "m.yaml", duplicates="drop"), folder=tmp_path)

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 from commands import ENVIRONMENT, SMALL, done, refused
 
-from gsl.core.budget import check_file, is_plain
+from gsl.core.budget import check_file, holds, open_file
 from gsl.errors import GslError, InputError
 from gsl.runner.robots import robot_of
 from gsl.storage.importers.formats import ENDS, table
@@ -42,23 +42,42 @@ def put(path: Path, kind: str) -> Path:
 @pytest.mark.parametrize("kind", KINDS)
 def test_whatever_opens_files_refuses_it(kind: str, tmp_path: Path) -> None:
     path = put(tmp_path / "x.py", kind)
-    assert not is_plain(path)
-    for read in (check_file, lambda path: Records(path, print)):
+    assert not holds(path, b"")
+    for read in (check_file, open_file, lambda path: Records(path, print)):
         with pytest.raises(InputError, match=NO_FILE):
             read(path)
     with pytest.raises(GslError, match=f"{NO_FILE}|does not exist"):
         robot_of(path)
 
 
-def test_the_kernels_files_under_another_name(tmp_path: Path) -> None:
-    ask = "from gsl.core.budget import is_plain; from pathlib import Path; print(is_plain(Path('version')))"
-    mounted = f"mount --bind /proc {tmp_path} && cd {tmp_path} && "
-    line = ["unshare", "--map-root-user", "--mount", "sh", "-c"]
+@pytest.mark.parametrize("mount", ("--bind /proc", "-t proc proc", "-t sysfs sysfs", "--bind /proc/version"))
+def test_the_kernels_files_under_another_name(mount: str, tmp_path: Path) -> None:
+    place = tmp_path / "x"
+    place.touch() if mount.endswith("version") else place.mkdir()
+    file = place if place.is_file() else place / ("power/state" if "sysfs" in mount else "version")
+    line = ["unshare", "--map-root-user", "--mount", "--pid", "--net", "--fork", "sh", "-c"]
+    mounted = f"mount {mount} {place} && "
     if not shutil.which("unshare") or subprocess.run([*line, f"{mounted} true"], check=False).returncode:
-        pytest.skip("no folder can be mounted here")
+        pytest.skip("nothing can be mounted here")
+    ask = f"from gsl.core.budget import check_file; from pathlib import Path; check_file(Path({str(file)!r}))"
     line += [f'{mounted} exec "$0" -c "$1"', sys.executable, ask]
-    ended = subprocess.run(line, env=ENVIRONMENT, capture_output=True, text=True, check=True)
-    assert ended.stdout == "False\n"
+    ended = subprocess.run(line, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+    assert f"InputError: {file}: {NO_FILE}" in ended.stderr
+
+
+def test_what_was_checked_is_what_is_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    path, check = tmp_path / "x.csv", os.path.realpath
+    path.write_text("good")
+
+    def exchange(name: Path) -> str:  # after the last look at the path
+        monkeypatch.undo()
+        path.unlink()
+        os.mkfifo(path)
+        return check(name)
+
+    monkeypatch.setattr(os.path, "realpath", exchange)
+    with pytest.raises(InputError, match=NO_FILE):
+        open_file(path)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -14,13 +14,14 @@ from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.series import SAME, hold, interpolate, pieces
 from gsl.core.trajectory import Trajectory
 from gsl.effects.effect import together
-from gsl.errors import InputError
+from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.labels import fill
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.reading import Raw, Series
 from gsl.storage.importers.signal import BESIDE, COMMANDS, FLAGS
 from gsl.storage.signals.check import join_turns
 from gsl.storage.signals.glitches import find_glitches, mend
+from gsl.storage.trajectory_contract import LARGEST
 
 ARRAYS = (*COMMANDS, "position", "velocity")
 MOST_ROWS, FINER = 100_000, 20  # rows that any resampling may make, and for each row of a larger log
@@ -78,6 +79,7 @@ def episodes(raw: Raw, mapping: LogMapping) -> list[Episode]:
     for number, cut in enumerate(cuts):
         part = {"part": number + 1} if len(cuts) > 1 else {}
         trajectory = _mend(_trajectory(raw, own[cut], mapping), mapping)
+        _check_size(raw, trajectory, own[cut][0] - stamps[0])
         dropped = raw.dropped + (late if number == 0 else 0)
         derived = "velocity" not in raw.signals
         said = remarks if number == 0 else ()
@@ -126,6 +128,17 @@ def _trajectory(raw: Raw, stamps: np.ndarray, mapping: LogMapping) -> Trajectory
         action = np.repeat(values["position"][:1], len(at) - 1, axis=0)
         columns |= {f"kp_command.{joint}": np.zeros(len(at)) for joint in raw.joints}
     return Trajectory(time, action, values["position"], velocity, grounded, sensors=columns)
+
+
+def _check_size(raw: Raw, episode: Trajectory, begin: float) -> None:
+    """Refuse values that no trajectory file may hold, in the words of the log, which begins `begin` [s] earlier."""
+    arrays = {name: array for name in ARRAYS if (array := getattr(episode, name)) is not None}
+    for name, values in {**arrays, **episode.sensors}.items():
+        if len(wrong := np.argwhere(np.abs(values) > LARGEST)):
+            row, joint = wrong[0][0], "".join(f".{raw.joints[column]}" for column in wrong[0][1:])
+            what = f"is {values[tuple(wrong[0])]:.3g} {begin + episode.time[row]:.6g} s after the start of {raw.name}"
+            problem = f"{what}, which nothing measures ({LARGEST:g} at most); drop or mend the row"
+            raise TrajectoryError(raw.file, problem, column=f"{name}{joint}")
 
 
 def _mend(episode: Trajectory, mapping: LogMapping) -> Trajectory:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.budget import COLUMNS, DEPTH, check_file
+from gsl.core.budget import COLUMNS, DEPTH, check_file, open_file
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
 from gsl.storage.importers.sizes import DAMAGED
@@ -23,7 +23,7 @@ MATLAB_HEADER = 512  # bytes before the magic in a mat file of version 7.3
 
 def is_hdf5(path: Path) -> bool:
     """Tell whether a file is one of HDF5, by its first bytes, or by those after a header of MATLAB's."""
-    with path.open("rb") as file:
+    with open_file(path) as file:
         start = file.read(MATLAB_HEADER + len(MAGIC))
     return start.startswith(MAGIC) or start.endswith(MAGIC)
 

@@ -13,7 +13,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.lib import format as npy
 
-from gsl.core.budget import COLUMNS, HEADER_BYTES
+from gsl.core.budget import COLUMNS, HEADER_BYTES, open_file
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.array_table import Shapes
 from gsl.storage.importers.sizes import DAMAGED
@@ -31,7 +31,7 @@ class NpzArrays:
         self.path = path
         self.fields: Mapping[str, Any] = {}
         try:
-            with zipfile.ZipFile(path) as archive:
+            with open_file(path) as file, zipfile.ZipFile(file) as archive:
                 members = [info for info in archive.infolist() if info.filename.endswith(END)]
                 self.shapes: Shapes = {
                     info.filename.removesuffix(END): _header(archive, info, path) for info in members
@@ -42,7 +42,7 @@ class NpzArrays:
     def read(self, names: Sequence[str]) -> dict[str, np.ndarray]:
         """Return arrays by name."""
         try:
-            with np.load(self.path, allow_pickle=False) as archive:
+            with open_file(self.path) as file, np.load(file, allow_pickle=False) as archive:
                 return {name: archive[name] for name in names}
         except (*_DAMAGED, ValueError, KeyError) as error:
             raise TrajectoryError(self.path, f"is damaged: {error}; copy it again") from error
@@ -87,7 +87,7 @@ def npy_files(folder: Path) -> list[Path]:
 
 def _read_shape(path: Path) -> tuple[tuple[int, ...], np.dtype[Any]]:
     try:
-        with path.open("rb") as file:
+        with open_file(path) as file:
             return _read_header(file)
     except (OSError, *_NO_HEADER) as error:
         raise TrajectoryError(path, "is no numpy array, or damaged; save it with numpy.save") from error

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gsl.core.budget import open_file
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.sizes import DAMAGED, check_need
 from gsl.storage.importers.table import numbers
@@ -35,7 +36,7 @@ class ParquetTable:
         import pyarrow.parquet as pq
 
         try:
-            with pq.ParquetFile(self.path) as file:
+            with open_file(self.path) as source, pq.ParquetFile(source) as file:
                 simple = [field.name for field in file.schema_arrow if pa.types.is_primitive(field.type)]
                 simple = [name for name in simple if name in wanted]
                 nested = [name for name in wanted if name not in simple]
@@ -59,7 +60,8 @@ def names_of(path: Path) -> list[str]:
     import pyarrow.parquet as pq
 
     try:
-        return list(pq.read_schema(path).names)
+        with open_file(path) as source:
+            return list(pq.read_schema(source).names)
     except (pa.ArrowException, OSError) as error:
         raise TrajectoryError(path, f"is not a parquet file, or {DAMAGED}") from error
 

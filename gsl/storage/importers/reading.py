@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +46,7 @@ class Raw:
 
     Attributes:
         name: Where it comes from.
+        file: Of its positions.
         joints: Names, in order.
         signals: By the contract's name.
         fields: What its files and its path say once.
@@ -53,6 +55,7 @@ class Raw:
     """
 
     name: str
+    file: Path
     joints: tuple[str, ...]
     signals: Mapping[str, Series]
     fields: Mapping[str, Any]
@@ -116,7 +119,7 @@ def _episodes(place: Place, mapping: LogMapping, tables: Mapping[str, Table]) ->
                 continue
             series, twice = reading.series(values[spec.file], tuple(joints))
             signals[signal], dropped = series, max(dropped, twice)
-        yield Raw(name, tuple(joints), signals, own, dropped, remarks)
+        yield Raw(name, tables[named["position"].file].path, tuple(joints), signals, own, dropped, remarks)
 
 
 def _tables(place: Place, mapping: LogMapping, memory: float) -> dict[str, Table]:

@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import IO
 
+from gsl.core.budget import open_file
 from gsl.errors import TrajectoryError
 
 GB = 1e9
@@ -46,7 +47,7 @@ def open_log(path: Path, *, most: float, lines: bool = False) -> Iterator[IO[byt
     try:
         packed = path.name.endswith(".gz")
         most = min(most, max(FEW, PACKED * path.stat().st_size)) if packed else most
-        with path.open("rb") as raw:
+        with open_file(path) as raw:
             source = gzip.GzipFile(fileobj=raw) if packed else raw
             reader = io.BufferedReader(_Counted(path, source, most, lines))
             start = reader.peek(1)[:1]

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import pickle
 import warnings
 import zipfile
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
-from gsl.core.budget import DEPTH, within
+from gsl.core.budget import DEPTH, open_file, within
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.array_table import Shapes
 from gsl.storage.importers.sizes import DAMAGED, check_need
@@ -26,11 +27,12 @@ class TensorArrays:
         import torch
 
         self.path = path
-        check_need(path, 2.0 * _measure(path), memory)
         try:
-            with within(f"{path}: reading it", growth=memory), warnings.catch_warnings():
+            with open_file(path) as file, within(f"{path}: reading it", growth=memory), warnings.catch_warnings():
+                check_need(path, 2.0 * _measure(file), memory)
+                file.seek(0)
                 warnings.simplefilter("ignore", UserWarning)  # of pickles of another protocol, which are refused
-                saved = torch.load(path, map_location="cpu", weights_only=True)
+                saved = torch.load(file, map_location="cpu", weights_only=True)
         except pickle.UnpicklingError as error:
             problem = "holds more than tensors (a pickle, which can run code): none is read; save a dict of tensors"
             raise TrajectoryError(path, problem) from error
@@ -62,11 +64,11 @@ class TensorArrays:
             raise TrajectoryError(self.path, f"holds no plain tensors: {str(error).splitlines()[0]}") from error
 
 
-def _measure(path: Path) -> float:
+def _measure(file: IO[bytes]) -> float:
     """Return the bytes of a file, or what it unpacks to if it is an archive."""
-    size = float(path.stat().st_size)
+    size = float(file.seek(0, os.SEEK_END))
     try:
-        with zipfile.ZipFile(path) as archive:
+        with zipfile.ZipFile(file) as archive:
             return max(size, float(sum(entry.file_size for entry in archive.infolist())))
     except (zipfile.BadZipFile, OSError, ValueError, NotImplementedError):
         return size  # an older file, or damaged, which torch will tell

@@ -11,7 +11,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from gsl.core.budget import COLUMNS, check_file, parse_json, read_json
+from gsl.core.budget import COLUMNS, open_file, parse_json, read_json, read_text
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.sizes import check_need
 from gsl.storage.parquet import count_bytes
@@ -188,16 +188,14 @@ def _read_episodes(folder: Path, version: str, memory: float) -> Iterator[dict[s
 def _read_table(path: Path, names: list[str], memory: float) -> list[dict[str, Any]]:
     import pyarrow.parquet as pq
 
-    check_file(path)
-    with pq.ParquetFile(path) as file:  # what pyarrow raises of a damaged file is a ValueError or an OSError
+    with open_file(path) as source, pq.ParquetFile(source) as file:
         there = [name for name in names if name in file.schema_arrow.names]
         check_need(path, 20.0 * count_bytes(file.metadata, there), memory)
         return file.read(columns=there).to_pylist()
 
 
 def _read_lines(path: Path, memory: float) -> list[Any]:
-    check_file(path, memory / 10.0)
-    return [parse_json(line) for line in path.read_text(encoding="utf-8").splitlines() if line.strip()]
+    return [parse_json(line) for line in read_text(path, memory / 10.0).splitlines() if line.strip()]
 
 
 def _check_files(folder: Path, entries: list[Entry]) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.budget import check_file
+from gsl.core.budget import open_file
 from gsl.errors import TrajectoryError
 from gsl.storage.importers.parquet_table import convert, names_of
 from gsl.storage.importers.sizes import check_need
@@ -27,7 +27,6 @@ class EpisodeTable:
     def __init__(self, entry: Entry, memory: float) -> None:
         self.entry, self.path, self.memory = entry, entry.file, memory
         self.fields: Mapping[str, Any] = entry.fields
-        check_file(self.path)
         self.raw = names_of(self.path)
         self.parts = {
             f"{key}.{name}": (key, index)
@@ -68,9 +67,9 @@ class EpisodeTable:
             if name not in self.raw:
                 raise TrajectoryError(self.path, "is missing; every data set of LeRobot has it", column=name)
         try:
-            with pq.ParquetFile(self.path) as file:
-                check_need(self.path, 2.0 * count_bytes(file.metadata, names), self.memory)
-            table = pq.read_table(self.path, columns=names, filters=[("episode_index", "==", self.entry.number)])
+            with open_file(self.path) as source:
+                check_need(self.path, 2.0 * count_bytes(pq.read_metadata(source), names), self.memory)
+                table = pq.read_table(source, columns=names, filters=[("episode_index", "==", self.entry.number)])
         except (pa.ArrowException, OSError, ValueError) as error:
             raise TrajectoryError(self.path, "is truncated or damaged; copy it again") from error
         if table.num_rows != self.entry.rows:
