@@ -40,6 +40,7 @@ REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
 LOGS = ("real", "reference")  # settings that name recorded trajectories
 LOGS_TOGETHER = "several logs are one folder of files"
 WHOLE = "iterate"  # the command, and the setting of others, that makes what a grounding refers to
+PLACES = re.compile(r'[^\s,:"\[\]{}]*(?:\{\w+\}[^\s,:"\[\]{}]*)+')  # a text of a mapping: {date}/{motion}
 MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo|model)")
 
 
@@ -171,14 +172,15 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
 def _unreadable(override: str, parser: OverridesParser) -> str:
     """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
     key, _, value = override.partition("=")
-    quoted = f'{key}="{value}"'
-    if not value or "'" in value or value[0] in '[{"':  # more than a word that has odd characters
+    places = PLACES.sub(r'"\g<0>"', value)
+    quoted = places if places != value else f'"{value}"'
+    if not value or "'" in value or (quoted != places and value[0] in '[{"'):  # more than a word that has odd characters
         return "cannot be read"
     try:
-        parser.parse_override(quoted)
+        parser.parse_override(f"{key}={quoted}")
     except HydraException:
         return "cannot be read"
-    return f"cannot be read; such characters take quotes inside those of the shell: '{quoted}'"
+    return f"cannot be read; such characters take quotes inside those of the shell: '{key}={quoted}'"
 
 
 def _check_effects(composition: Composition) -> None:
@@ -223,9 +225,15 @@ def _sign(override: Override, config: DictConfig) -> str:
     if _is_choice(override) or str(override.input_line).startswith(("+", "~")):
         return ""
     above, _, mapping = parent.rpartition(".")
-    around = _find_declared(config, above).get(mapping)
     keys = {*_find_declared(config, parent), *read_parts(_node(config, above)).get(mapping, {})}
-    return "++" if name in keys or (around is not None and around.named) else ""
+    return "++" if name in keys or _is_below_names(config, parent) else ""
+
+
+def _is_below_names(config: DictConfig, path: str) -> bool:
+    """Whether a path is a mapping whose names nobody declares, such as the signals of a log, or lies below one."""
+    above, _, name = path.rpartition(".")
+    around = _find_declared(config, above).get(name)
+    return (around is not None and around.named) or (bool(above) and _is_below_names(config, above))
 
 
 def _find_declared(config: DictConfig, path: str) -> Mapping[str, Setting]:
