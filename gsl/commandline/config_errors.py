@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from glob import escape
 from pathlib import Path
 from typing import Any
 
@@ -59,8 +60,9 @@ def translate(error: Exception, words: Vocabulary) -> Exception:
         groups = {*OPTIONAL_GROUPS, *(choice.partition("@")[0] for choice in words.chosen)}
         group = next((group for group in groups if file.startswith(f"{group}/")), file.rpartition("/")[0])
         name = file.removeprefix(f"{group}/")
-        is_path = "/" in name or (name.endswith((".yaml", ".yml")) and Path(name).stem not in error.options)
-        hint = _own_file(group, Path(name)) if is_path else did_you_mean(name, error.options, listed=True)
+        is_path = "/" in name or (name.endswith((".yaml", ".yml", ".urdf")) and Path(name).stem not in error.options)
+        hint = _own_file(group, Path(name)) if is_path else _own_folder(group, name)
+        hint = hint or did_you_mean(name, error.options, listed=True)
         return InputError(f"no {group} called {name or '(nothing)'}{hint}")
     if key := unknown_key(error):
         return _no_such_setting(key, words)
@@ -87,14 +89,22 @@ def _own_file(group: str, place: Path) -> str:
     """Return how a file of the user's own is taken that was named by its path, or by the folder around it."""
     from gsl.storage.references import RUNS
 
-    inside = (sorted(folder.glob(f"{group}/*.yaml")) for folder in (place, RUNS / place))
-    if files := next(filter(None, inside), None):
-        folder, names = files[0].parents[1].as_posix(), [path.stem for path in files]
-    elif place.parent.name == group:
+    if group == "world" and place.suffix == ".urdf":
+        return f"; a robot is a setting of the world urdf: world=urdf world.robot={place}, or sim=urdf sim.robot={place}"
+    inside = (sorted(folder.glob(f"{group}/*.yaml")) for folder in (place, RUNS / place, place.parent))
+    if place.parent.name == group:
         folder, names = place.parent.parent.as_posix(), [place.stem]
+    elif files := next(filter(None, inside), None):
+        folder, names = files[0].parents[1].as_posix(), [path.stem for path in files]
     else:
         folder, names = f"FOLDER, in which it is {group}/{place.stem}.yaml", [place.stem]
     return f"; a file of your own is taken by its name: {' or '.join(names)}, with --config-dir {folder}"
+
+
+def _own_folder(group: str, name: str) -> str:
+    """Return which folder of the current one holds a file of a group, if any does."""
+    folders = [path.parents[1].as_posix() for path in sorted(Path().glob(f"*/{group}/{escape(name)}.yaml"))]
+    return f"; it is in {' and '.join(folders)}: say --config-dir {folders[0]}" if folders else ""
 
 
 def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
