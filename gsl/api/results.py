@@ -86,7 +86,7 @@ class Verdict(Result):
     def suspects(self) -> pd.DataFrame:
         """The causes, or the nearest effects if the verdict is `unknown`: a row for each parameter.
 
-        Columns: effect, scope, parameter, value, low, high (of the 95 % interval), unit (SI, × of a factor), probability.
+        Columns: effect, scope, parameter, value, low and high (95 % interval), unit (× of a factor), probability.
         """
         import pandas as pd  # takes a quarter of a second, and few ask
 

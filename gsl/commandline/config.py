@@ -23,6 +23,7 @@ from gsl.core.described import describe, restore
 from gsl.core.setting import component, setting
 from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import make
+from gsl.effects.effect import list_unusual
 from gsl.errors import ConfigError
 from gsl.rollout.cluster import Cluster, executing
 from gsl.storage.identity import flat
@@ -110,6 +111,10 @@ def execute(
 
     with console.at_work(command):
         stage, settings, own = prepare(config, trust)
+        for role, part in vars(stage).items():
+            if hasattr(part, "effects") and hasattr(part, "plant"):
+                for line in list_unusual(part.effects, part.plant.robot):
+                    console.status(f"warning: {role}.{line}")
         if getattr(stage, "only_looks", False):
             return dict(stage.look(console))
         out = own.folder(command, level)

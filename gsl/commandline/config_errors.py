@@ -90,7 +90,9 @@ def _own_file(group: str, place: Path) -> str:
     from gsl.storage.references import RUNS
 
     if group == "world" and place.suffix == ".urdf":
-        return f"; a robot is a setting of the world urdf: world=urdf world.robot={place}, or sim=urdf sim.robot={place}"
+        return (
+            f"; a robot is a setting of the world urdf: world=urdf world.robot={place}, or sim=urdf sim.robot={place}"
+        )
     inside = (sorted(folder.glob(f"{group}/*.yaml")) for folder in (place, RUNS / place, place.parent))
     if place.parent.name == group:
         folder, names = place.parent.parent.as_posix(), [place.stem]

@@ -168,7 +168,9 @@ def slope(position: np.ndarray, period: float) -> np.ndarray:
     if not np.isfinite(position).all():
         return np.full_like(position, np.nan)
     length = min(SMOOTHER, len(position) - (len(position) + 1) % 2)
-    return scipy.signal.savgol_filter(position, length, min(3, length - 1), deriv=1, delta=period, axis=0, mode="interp")
+    return scipy.signal.savgol_filter(
+        position, length, min(3, length - 1), deriv=1, delta=period, axis=0, mode="interp"
+    )
 
 
 class OnGround(NamedTuple):
