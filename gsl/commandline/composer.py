@@ -174,9 +174,7 @@ def _unreadable(override: str, parser: OverridesParser) -> str:
     key, _, value = override.partition("=")
     places = PLACES.sub(r'"\g<0>"', value)
     quoted = places if places != value else f'"{value}"'
-    if (
-        not value or "'" in value or (quoted != places and value[0] in '[{"')
-    ):  # more than a word that has odd characters
+    if not value or "'" in value or (quoted != places and value[0] in '[{"'):  # more than a word of odd characters
         return "cannot be read"
     try:
         parser.parse_override(f"{key}={quoted}")

@@ -67,7 +67,7 @@ class BudgetedFiles(FileConfigSource):
 
 def _find_robots(config: Any, folder: Path) -> None:
     """Let `robot:` name a file as seen from the folder of --config-dir, wherever the command is typed."""
-    for key in config if isinstance(config, DictConfig) else ():
+    for key in (key for key in config if isinstance(key, str)) if isinstance(config, DictConfig) else ():
         value = None if OmegaConf.is_missing(config, key) or OmegaConf.is_interpolation(config, key) else config[key]
         if key == ROBOT and isinstance(value, str) and Path(value).suffix and (folder / value).is_file():
             config[key] = os.path.relpath(folder / value)
