@@ -22,7 +22,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from gsl.commandline.config_errors import Vocabulary, misshapen, translate, unfit, unknown_key
+from gsl.commandline.config_errors import Vocabulary, misshapen, shapeless, translate, unfit, unknown_key, unreadable
 from gsl.commandline.known_settings import list_keys, plain, read_declared, read_parts
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
 from gsl.commandline.own_word import check_own_word, find_own_modules, find_trust
@@ -40,7 +40,6 @@ REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
 LOGS = ("real", "reference")  # settings that name recorded trajectories
 LOGS_TOGETHER = "several logs are one folder of files"
 WHOLE = "iterate"  # the command, and the setting of others, that makes what a grounding refers to
-PLACES = re.compile(r'[^\s,:"\[\]{}]*(?:\{\w+\}[^\s,:"\[\]{}]*)+')  # a text of a mapping: {date}/{motion}
 MADE = re.compile(r"(?:grounding|methods\.\w+)(?:\.inner)?\.(?:forward_model|inverse_model|diagnosis|servo|model)")
 
 
@@ -159,7 +158,7 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
         try:
             parsed.append(read := parser.parse_overrides([override])[0])  # with the loader, which a glob asks
         except HydraException as error:
-            raise ConfigError(key, _unreadable(override, parser), given=value) from error
+            raise ConfigError(key, unreadable(override, parser), given=value) from error
         if read.is_sweep_override() and not multirun:
             together = f"a list is written '{key}=[{value}]'" if key not in LOGS else LOGS_TOGETHER
             more = f"; {together}" if read.is_choice_sweep() else ""
@@ -167,20 +166,6 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
         if _is_choice(read) and not (read.is_sweep_override() or isinstance(read.value(), str | list | dict)):
             raise ConfigError(key.rpartition("@")[2], "takes the name of a file", given=value)
     return parsed
-
-
-def _unreadable(override: str, parser: OverridesParser) -> str:
-    """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
-    key, _, value = override.partition("=")
-    places = PLACES.sub(r'"\g<0>"', value)
-    quoted = places if places != value else f'"{value}"'
-    if not value or "'" in value or (quoted != places and value[0] in '[{"'):  # more than a word of odd characters
-        return "cannot be read"
-    try:
-        parser.parse_override(f"{key}={quoted}")
-    except HydraException:
-        return "cannot be read"
-    return f"cannot be read; such characters take quotes inside those of the shell: '{key}={quoted}'"
 
 
 def _check_effects(composition: Composition) -> None:
@@ -226,7 +211,10 @@ def _sign(override: Override, config: DictConfig) -> str:
         return ""
     above, _, mapping = parent.rpartition(".")
     keys = {*_find_declared(config, parent), *read_parts(_node(config, above)).get(mapping, {})}
-    return "++" if name in keys or _is_below_names(config, parent) else ""
+    is_below = _is_below_names(config, parent)
+    if is_below and isinstance(plain_value := OmegaConf.select(config, parent), str | int | float):
+        raise shapeless(parent, name, plain_value)
+    return "++" if name in keys or is_below else ""
 
 
 def _is_below_names(config: DictConfig, path: str) -> bool:

@@ -9,7 +9,8 @@ from glob import escape
 from pathlib import Path
 from typing import Any
 
-from hydra.errors import MissingConfigException
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.errors import HydraException, MissingConfigException
 from omegaconf import DictConfig
 from omegaconf.errors import InterpolationToMissingValueError, MissingMandatoryValue
 
@@ -20,6 +21,7 @@ from gsl.errors import ConfigError, InputError
 
 _UNKNOWN = re.compile(r"Could not (?:override|delete from config\.) '([^']+)'")  # hydra's exception has no field for it
 _MERGED = "Error merging override "
+_PLACES = re.compile(r'[^\s,:"\[\]{}]*(?:\{\w+\}[^\s,:"\[\]{}]*)+')  # a text of a mapping: {date}/{motion}
 _FILE = re.compile(r"In '([^']+)'")  # in which a yaml file says something of another shape
 _ROUND = ("Recursive interpolation", "RecursionError")  # the second within an entry of a list
 _WRITE = "write the value itself"
@@ -109,12 +111,32 @@ def _own_folder(group: str, name: str) -> str:
     return f"; it is in {' and '.join(folders)}: say --config-dir {folders[0]}" if folders else ""
 
 
+def unreadable(override: str, parser: OverridesParser) -> str:
+    """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
+    key, _, value = override.partition("=")
+    places = _PLACES.sub(r'"\g<0>"', value)
+    quoted = places if places != value else f'"{value}"'
+    if not value or "'" in value or (quoted != places and value[0] in '[{"'):  # more than a word of odd characters
+        return "cannot be read"
+    try:
+        parser.parse_override(f"{key}={quoted}")
+    except HydraException:
+        return "cannot be read"
+    return f"cannot be read; such characters take quotes inside those of the shell: '{key}={quoted}'"
+
+
+def shapeless(key: str, name: str, value: str | float) -> ConfigError:
+    """Return the error for a setting below one that is a single value, such as the column of a signal."""
+    hint = f"; with a {name} it is '{key}={{column: \"{value}\", {name}: ...}}'" if ".signals." in key else ""
+    return ConfigError(key, f"is a single value and has no {name}{hint}", given=str(value))
+
+
 def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
     """Return the error for an argument that hydra stumbles over: a key in a list."""
     last = str(error).rpartition(" ")[2].strip("'")
     keys = [key for argument in arguments if last in (key := argument.partition("=")[0].lstrip("+~")).split(".")]
     where = keys[0].rpartition(".")[0] if keys else "configuration"
-    return ConfigError(where, "is a list of entries here, which have no names; set all of it: KEY=[{...}, {...}]")
+    return ConfigError(where, f"is a list, whose entries have no names; set all of it: '{where}=[{{...}}, {{...}}]'")
 
 
 def resolution_error(error: Exception) -> Exception:

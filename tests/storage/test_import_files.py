@@ -263,6 +263,8 @@ def test_signals_that_a_mapping_does_not_name_can_be_typed(tmp_path: Path, word:
     done("import", "source=log.csv", f"mapping.signals.{word}", "--check", folder=tmp_path)
     line = refused("import", "source=log.csv", "mapping.signals.velocity.bit=16", folder=tmp_path)
     assert line == "mapping.signals.velocity.bit: no such setting; did you mean bits?"
+    line = refused("import", "source=log.csv", "mapping.signals.position.unit=deg", folder=tmp_path)
+    assert line.endswith("""with a unit it is 'mapping.signals.position={column: "position.{joint}", unit: ...}'""")
 
 
 def test_a_folder_called_by_a_number_comes_with_its_quotes(tmp_path: Path) -> None:
