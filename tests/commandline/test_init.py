@@ -123,13 +123,19 @@ def test_an_edited_urdf_is_noticed_and_a_moved_one_is_not(place: Path) -> None:
         ("world=nao_ideal world.robot=models/arm.urdf", "the arm has no feet to stand on; say floating=false"),
         (
             "world=so101 preset=toy workers=1",
-            "needs foot_force, which this world does not observe; a robot without feet",
+            "policy: needs foot_force, which this world does not observe; a robot without feet",
         ),
         ("world=nao_ideal world.robot=models/arm", "no robot called 'models/arm'"),
     ],
 )
 def test_a_world_without_its_robot(arguments: str, line: str, place: Path) -> None:
     assert line in refused("collect", *arguments.split(), folder=place)
+
+
+def test_a_policy_for_feet_is_refused_before_anything_is_collected(place: Path) -> None:
+    line = refused("iterate", "sim=so101", "real=so101", "preset=toy", "workers=1", "name=none", folder=place)
+    assert line.startswith("policy: needs foot_force, ") and "docs/howto/own-policy.md" in line
+    assert not (place / "runs/none/iteration_01").exists()
 
 
 def test_a_log_that_lacks_a_joint(place: Path) -> None:
