@@ -15,7 +15,7 @@ from omegaconf import DictConfig
 from omegaconf.errors import InterpolationToMissingValueError, MissingMandatoryValue
 
 from gsl.commandline.known_settings import list_keys
-from gsl.commandline.overrides import COMMAND_KEYS, OPTIONAL_GROUPS
+from gsl.commandline.overrides import COMMAND_KEYS, FILE_GROUPS, OPTIONAL_GROUPS
 from gsl.core.validation import NO_SUCH, did_you_mean
 from gsl.errors import ConfigError, InputError
 
@@ -106,7 +106,9 @@ def _own_file(group: str, place: Path) -> str:
 
 
 def _own_folder(group: str, name: str) -> str:
-    """Return which folder of the current one holds a file of a group, if any does."""
+    """Return which folder of the current one holds a file of a group, or that a mapping lies here, if that is so."""
+    if group in FILE_GROUPS and Path(f"{name}.yaml").is_file():
+        return f"; yours is {group}={name}.yaml"
     folders = [path.parents[1].as_posix() for path in sorted(Path().glob(f"*/{group}/{escape(name)}.yaml"))]
     return f"; it is in {' and '.join(folders)}: say --config-dir {folders[0]}" if folders else ""
 

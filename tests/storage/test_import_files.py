@@ -267,6 +267,11 @@ def test_signals_that_a_mapping_does_not_name_can_be_typed(tmp_path: Path, word:
     assert line.endswith("""with a unit it is 'mapping.signals.position={column: "position.{joint}", unit: ...}'""")
 
 
+def test_a_mapping_that_is_named_without_its_ending_is_offered(tmp_path: Path) -> None:
+    mapping(tmp_path)
+    assert refused("import", "source=log.csv", "mapping=m", folder=tmp_path).endswith("; yours is mapping=m.yaml")
+
+
 def test_a_folder_called_by_a_number_comes_with_its_quotes(tmp_path: Path) -> None:
     line = refused("import", "source=20", mapping(tmp_path), folder=tmp_path)
     assert line == "source = 20: must be a text; in quotes inside those of the shell it is: '\"20\"'"
