@@ -9,7 +9,8 @@ GSL ?= $(VENV)/bin/gsl
 PYTHON ?= $(shell command -v python3.11 || command -v python3)
 INSTALLED := $(VENV)/.stamp
 SITE := .venv-docs/.stamp
-
+# Writes the help of all commands, which reads every class, into the cache: each would else take seconds the first time.
+HELP := 'from gsl.cli import app, call; [call([info.name, "--help"]) for info in app.registered_commands if info.name]'
 
 DEMO ?= name=demo beside=true force=true
 
@@ -84,6 +85,7 @@ $(INSTALLED): pyproject.toml Makefile
 	test -d $(VENV) || $(PYTHON) -m venv $(VENV)
 	$(VENV)/bin/python -m pip install --quiet 'torch>=2.4,<2.14'
 	$(VENV)/bin/python -m pip install --quiet -e '.[dev,sweep,mujoco,rl,mesh]'
+	$(VENV)/bin/python -c $(HELP) > /dev/null
 	touch $@
 
 # The chain of single commands. A stage runs when its configuration, the code or what it reads has changed, and a chain that

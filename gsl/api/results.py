@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from gsl.core.budget import DOCUMENT_BYTES, read_text
 from gsl.core.described import restore
@@ -18,6 +18,9 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import report_of
 from gsl.storage.hashing import PAGE
 from gsl.storage.manifest import check_files
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 _FRAME = 'sandbox="allow-scripts" style="width: 100%; height: 600px; border: 0"'
 """A page may be a stranger's: its scripts do not reach the notebook around it, which can run code."""
@@ -44,6 +47,11 @@ class Result:
     def metrics(self) -> Mapping[str, Any]:
         """The figures that the stage reported."""
         return self.artifact.metrics
+
+    @property
+    def page(self) -> Path | None:
+        """Its page, to be opened in a browser; None of a stage that writes none."""
+        return page if (page := self.folder / PAGE).is_file() else None
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.folder.as_posix()})"
@@ -73,6 +81,22 @@ class Verdict(Result):
     def causes(self) -> list[str]:
         """Names of the effects that cause the gap."""
         return [cause["effect"] for cause in self.report["causes"]]
+
+    @property
+    def suspects(self) -> pd.DataFrame:
+        """The causes, or the nearest effects if the verdict is `unknown`: a row for each parameter.
+
+        Columns: effect, scope, parameter, value, low and high (95 % interval), unit (× of a factor), probability.
+        """
+        import pandas as pd  # takes a quarter of a second, and few ask
+
+        report, columns = self.report, ("value", "low", "high", "unit")
+        rows = [
+            (cause["effect"], cause["scope"], name, *(values.get(key) for key in columns), cause.get("probability"))
+            for cause in report["causes"] or report["suspects"]
+            for name, values in (cause["parameters"] or {"": {}}).items()
+        ]
+        return pd.DataFrame(rows, columns=["effect", "scope", "parameter", *columns, "probability"])
 
     @property
     def effects(self) -> Mapping[str, Any]:

@@ -14,6 +14,7 @@ from functools import cached_property
 from typing import Annotated, Any
 
 from gsl.commandline.words import read_span
+from gsl.core.configuration import name_world
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError, ConfigError
@@ -35,7 +36,7 @@ class Choice:
 
     kind: Annotated[str, setting("kinds of artifact, with commas between: iterate,optimize")] = ""
     name: Annotated[str, setting("part of the reference, or a pattern with *")] = ""
-    world: Annotated[str, setting("a world that its command names, or a robot or effect of its worlds")] = ""
+    world: Annotated[str, setting("one of its worlds, or a robot or effect of them")] = ""
     metric: Annotated[str, setting("a metric that it has, or a condition: 'returned.value>0.2'")] = ""
     newer: Annotated[str, setting("made within this time: 90s, 30min, 12h, 7d, 2w")] = ""
     older: Annotated[str, setting("made before this time")] = ""
@@ -65,7 +66,7 @@ class Run:
 
     @cached_property
     def worlds(self) -> set[str]:
-        """Names of worlds in its command, and the robots and effects of its worlds."""
+        """Names of its worlds, those in its command first of all, and their robots and effects."""
         words = (word.lstrip("+").partition("=") for word in self.artifact.manifest.command.split())
         names = {value for key, _, value in words if key in ROLES}
         try:
@@ -74,6 +75,7 @@ class Run:
             return names
         for world in (config.get(role) for role in ROLES):
             if isinstance(world, Mapping):
+                names |= name_world(world)
                 names |= {str(world.get("robot", "")), *map(str, world.get("effects") or ())}
         return names - {""}
 
@@ -149,6 +151,11 @@ def _check_metric(setting: str, name: str, runs: Sequence[Run], more: tuple[str,
         near = f"; did you mean {' or '.join(ends)}?" if ends else did_you_mean(name, {*names, *more})
         near = f"{near} There" if near.startswith("; did") else "; there"
         raise ConfigError(setting, f"none of these artifacts has this metric{near} {_list(runs)}", given=name)
+
+
+def find_deeper(name: str, runs: Sequence[Run]) -> list[str]:
+    """Return metrics whose last word is the name of another: `returned.falls` of `falls`."""
+    return sorted({metric for run in runs for metric in run.metrics if name != metric and metric.endswith(f".{name}")})
 
 
 def _list(runs: Sequence[Run]) -> str:

@@ -22,7 +22,7 @@ from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
-from gsl.commandline.config_errors import Vocabulary, misshapen, translate, unfit, unknown_key
+from gsl.commandline.config_errors import Vocabulary, misshapen, shapeless, translate, unfit, unknown_key, unreadable
 from gsl.commandline.known_settings import list_keys, plain, read_declared, read_parts
 from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
 from gsl.commandline.own_word import check_own_word, check_servos, find_own_modules, find_trust
@@ -159,7 +159,7 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
         try:
             parsed.append(read := parser.parse_overrides([override])[0])  # with the loader, which a glob asks
         except HydraException as error:
-            raise ConfigError(key, _unreadable(override, parser), given=value) from error
+            raise ConfigError(key, unreadable(override, parser), given=value) from error
         if read.is_sweep_override() and not multirun:
             together = f"a list is written '{key}=[{value}]'" if key not in LOGS else LOGS_TOGETHER
             more = f"; {together}" if read.is_choice_sweep() else ""
@@ -167,19 +167,6 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
         if _is_choice(read) and not (read.is_sweep_override() or isinstance(read.value(), str | list | dict)):
             raise ConfigError(key.rpartition("@")[2], "takes the name of a file", given=value)
     return parsed
-
-
-def _unreadable(override: str, parser: OverridesParser) -> str:
-    """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
-    key, _, value = override.partition("=")
-    quoted = f'{key}="{value}"'
-    if not value or "'" in value or value[0] in '[{"':  # more than a word that has odd characters
-        return "cannot be read"
-    try:
-        parser.parse_override(quoted)
-    except HydraException:
-        return "cannot be read"
-    return f"cannot be read; such characters take quotes inside those of the shell: '{quoted}'"
 
 
 def _check_effects(composition: Composition) -> None:
@@ -224,9 +211,18 @@ def _sign(override: Override, config: DictConfig) -> str:
     if _is_choice(override) or str(override.input_line).startswith(("+", "~")):
         return ""
     above, _, mapping = parent.rpartition(".")
-    around = _find_declared(config, above).get(mapping)
     keys = {*_find_declared(config, parent), *read_parts(_node(config, above)).get(mapping, {})}
-    return "++" if name in keys or (around is not None and around.named) else ""
+    is_below = _is_below_names(config, parent)
+    if is_below and isinstance(plain_value := OmegaConf.select(config, parent), str | int | float):
+        raise shapeless(parent, name, plain_value)
+    return "++" if name in keys or is_below else ""
+
+
+def _is_below_names(config: DictConfig, path: str) -> bool:
+    """Whether a path is a mapping whose names nobody declares, such as the signals of a log, or lies below one."""
+    above, _, name = path.rpartition(".")
+    around = _find_declared(config, above).get(name)
+    return (around is not None and around.named) or (bool(above) and _is_below_names(config, above))
 
 
 def _find_declared(config: DictConfig, path: str) -> Mapping[str, Setting]:

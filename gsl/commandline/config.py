@@ -23,7 +23,8 @@ from gsl.core.described import describe, restore
 from gsl.core.setting import component, setting
 from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import make
-from gsl.errors import ConfigError
+from gsl.effects.effect import list_unusual
+from gsl.errors import ArtifactError, ConfigError, InputError
 from gsl.rollout.cluster import Cluster, executing
 from gsl.storage.identity import flat
 
@@ -110,11 +111,18 @@ def execute(
 
     with console.at_work(command):
         stage, settings, own = prepare(config, trust)
+        for role, part in vars(stage).items():
+            if hasattr(part, "effects") and hasattr(part, "plant"):
+                for line in list_unusual(part.effects, part.plant.robot):
+                    console.status(f"warning: {role}.{line}")
         if getattr(stage, "only_looks", False):
             return dict(stage.look(console))
         out = own.folder(command, level)
-        with executing(own.cluster):
-            artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
+        try:
+            with executing(own.cluster):
+                artifact = build(stage, config=settings, out=out, command=line, force=own.force, console=console)
+        except ArtifactError as error:
+            raise _name_setting(error, settings, own.name) from error
     for table in account(artifact):
         console.table(*table)
     more: Callable[[Path], dict[str, Any]] = getattr(stage, "document", lambda folder: {})
@@ -161,6 +169,15 @@ def resolve(composition: Composition) -> dict[str, Any]:
         raise resolution_error(error) from error
     assert isinstance(container, dict)
     return {str(key): value for key, value in container.items()}
+
+
+def _name_setting(error: ArtifactError, settings: Mapping[str, Any], name: str) -> Exception:
+    """Return an error about what a command takes from its own run with the setting that names another run's."""
+    reference = str(error.path)
+    keys = (
+        [key for key, value in flat(settings).items() if value == reference] if reference.startswith(f"{name}/") else []
+    )
+    return InputError(f"{error}; {keys[0]}=RUN takes another run's") if keys else error
 
 
 def _missing(value: Any, path: str) -> Iterator[str]:

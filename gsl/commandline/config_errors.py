@@ -5,20 +5,23 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from glob import escape
 from pathlib import Path
 from typing import Any
 
-from hydra.errors import MissingConfigException
+from hydra.core.override_parser.overrides_parser import OverridesParser
+from hydra.errors import HydraException, MissingConfigException
 from omegaconf import DictConfig
 from omegaconf.errors import InterpolationToMissingValueError, MissingMandatoryValue
 
 from gsl.commandline.known_settings import list_keys
-from gsl.commandline.overrides import COMMAND_KEYS, OPTIONAL_GROUPS
+from gsl.commandline.overrides import COMMAND_KEYS, FILE_GROUPS, OPTIONAL_GROUPS
 from gsl.core.validation import NO_SUCH, did_you_mean
 from gsl.errors import ConfigError, InputError
 
 _UNKNOWN = re.compile(r"Could not (?:override|delete from config\.) '([^']+)'")  # hydra's exception has no field for it
 _MERGED = "Error merging override "
+_PLACES = re.compile(r'[^\s,:"\[\]{}]*(?:\{\w+\}[^\s,:"\[\]{}]*)+')  # a text of a mapping: {date}/{motion}
 _FILE = re.compile(r"In '([^']+)'")  # in which a yaml file says something of another shape
 _ROUND = ("Recursive interpolation", "RecursionError")  # the second within an entry of a list
 _WRITE = "write the value itself"
@@ -59,8 +62,9 @@ def translate(error: Exception, words: Vocabulary) -> Exception:
         groups = {*OPTIONAL_GROUPS, *(choice.partition("@")[0] for choice in words.chosen)}
         group = next((group for group in groups if file.startswith(f"{group}/")), file.rpartition("/")[0])
         name = file.removeprefix(f"{group}/")
-        is_path = "/" in name or (name.endswith((".yaml", ".yml")) and Path(name).stem not in error.options)
-        hint = _own_file(group, Path(name)) if is_path else did_you_mean(name, error.options, listed=True)
+        is_path = "/" in name or (name.endswith((".yaml", ".yml", ".urdf")) and Path(name).stem not in error.options)
+        hint = _own_file(group, Path(name)) if is_path else _own_folder(group, name)
+        hint = hint or did_you_mean(name, error.options, listed=True)
         return InputError(f"no {group} called {name or '(nothing)'}{hint}")
     if key := unknown_key(error):
         return _no_such_setting(key, words)
@@ -87,14 +91,46 @@ def _own_file(group: str, place: Path) -> str:
     """Return how a file of the user's own is taken that was named by its path, or by the folder around it."""
     from gsl.storage.references import RUNS
 
-    inside = (sorted(folder.glob(f"{group}/*.yaml")) for folder in (place, RUNS / place))
-    if files := next(filter(None, inside), None):
-        folder, names = files[0].parents[1].as_posix(), [path.stem for path in files]
-    elif place.parent.name == group:
+    if group == "world" and place.suffix == ".urdf":
+        return (
+            f"; a robot is a setting of the world urdf: world=urdf world.robot={place}, or sim=urdf sim.robot={place}"
+        )
+    inside = (sorted(folder.glob(f"{group}/*.yaml")) for folder in (place, RUNS / place, place.parent))
+    if place.parent.name == group:
         folder, names = place.parent.parent.as_posix(), [place.stem]
+    elif files := next(filter(None, inside), None):
+        folder, names = files[0].parents[1].as_posix(), [path.stem for path in files]
     else:
         folder, names = f"FOLDER, in which it is {group}/{place.stem}.yaml", [place.stem]
     return f"; a file of your own is taken by its name: {' or '.join(names)}, with --config-dir {folder}"
+
+
+def _own_folder(group: str, name: str) -> str:
+    """Return which folder of the current one holds a file of a group, or that a mapping lies here, if that is so."""
+    if group in FILE_GROUPS and Path(f"{name}.yaml").is_file():
+        return f"; yours is {group}={name}.yaml"
+    folders = [path.parents[1].as_posix() for path in sorted(Path().glob(f"*/{group}/{escape(name)}.yaml"))]
+    return f"; it is in {' and '.join(folders)}: say --config-dir {folders[0]}" if folders else ""
+
+
+def unreadable(override: str, parser: OverridesParser) -> str:
+    """Return what is wrong with a value: that it takes quotes within those of the shell, if these mend it."""
+    key, _, value = override.partition("=")
+    places = _PLACES.sub(r'"\g<0>"', value)
+    quoted = places if places != value else f'"{value}"'
+    if not value or "'" in value or (quoted != places and value[0] in '[{"'):  # more than a word of odd characters
+        return "cannot be read"
+    try:
+        parser.parse_override(f"{key}={quoted}")
+    except HydraException:
+        return "cannot be read"
+    return f"cannot be read; such characters take quotes inside those of the shell: '{key}={quoted}'"
+
+
+def shapeless(key: str, name: str, value: str | float) -> ConfigError:
+    """Return the error for a setting below one that is a single value, such as the column of a signal."""
+    hint = f"; with a {name} it is '{key}={{column: \"{value}\", {name}: ...}}'" if ".signals." in key else ""
+    return ConfigError(key, f"is a single value and has no {name}{hint}", given=str(value))
 
 
 def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
@@ -102,7 +138,7 @@ def misshapen(arguments: Sequence[str], error: ValueError) -> ConfigError:
     last = str(error).rpartition(" ")[2].strip("'")
     keys = [key for argument in arguments if last in (key := argument.partition("=")[0].lstrip("+~")).split(".")]
     where = keys[0].rpartition(".")[0] if keys else "configuration"
-    return ConfigError(where, "is a list of entries here, which have no names; set all of it: KEY=[{...}, {...}]")
+    return ConfigError(where, f"is a list, whose entries have no names; set all of it: '{where}=[{{...}}, {{...}}]'")
 
 
 def resolution_error(error: Exception) -> Exception:

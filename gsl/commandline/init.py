@@ -37,7 +37,7 @@ _ROBOT_HEAD = """\
 _WORLD_TEXT = """\
 # {name}, its base fixed. What you know that the simulator lacks is for effects to say (docs/reference/effects.md).
 defaults: [urdf, _self_]
-robot: {robot}   # as seen from where you type gsl
+robot: {robot}   # as seen from the folder of --config-dir, or else from where you type gsl
 period: {period:g}   # [s]: the control period of your logs
 effects:{effects}
 """
@@ -151,7 +151,7 @@ def _write(
             seen = asked.urdf if asked.urdf.startswith(PREFIX) else Path(os.path.relpath(urdf, folder)).as_posix()
             text = _robot_text(robot, urdf.name, seen, joints)
             (place / ROBOT).write_text(text, encoding="utf-8")
-            about = {"name": asked.name, "robot": (folder / ROBOT).as_posix(), "period": asked.period}
+            about = {"name": asked.name, "robot": ROBOT, "period": asked.period}
             about["effects"] = effects
             world.write_text(_WORLD_TEXT.format(**about), encoding="utf-8")
             os.rename(place, folder)

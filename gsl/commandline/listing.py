@@ -12,7 +12,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
-from gsl.commandline.choose_runs import Choice, Run, choose
+from gsl.commandline.choose_runs import Choice, Run, choose, find_deeper
 from gsl.commandline.words import split_words
 from gsl.core.validation import make
 from gsl.core.words import size
@@ -56,8 +56,9 @@ def list_runs(words: Sequence[str], console: Console) -> None:
     columns = ["reference", "kind", "made", "took", *([metric] if metric else []), "result"]
     rows = [(*_facts(run), *([plain(run.metrics[metric])] if metric else []), headline(run.artifact)) for run in chosen]
     title = f"artifacts below {RUNS}/" + (f": {len(chosen)} of {len(artifacts)}" if words else "")
+    deeper = find_deeper(metric, [Run(artifact) for artifact in artifacts]) if metric else []
     if rows:
-        console.table(title, columns, rows)
+        console.table(title, columns, rows, f"other artifacts have {', '.join(deeper[:3])}" if deeper else None)
     empty = f"none of the {len(artifacts)} artifacts below {RUNS}/ fits" if artifacts else "no artifacts below runs/"
     console.result({"artifacts": [_document(run, metric) for run in chosen]}, text="" if rows else empty)
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import REFERRED, compose, open_hydra
 from gsl.commandline.config import execute, prepare, resolve
 from gsl.commandline.multirun import run_jobs
 from gsl.commandline.own_effects import load_own_effects
@@ -51,7 +51,8 @@ def run(
                 console.status(f"warning: {TRUST}={module} is no module of this folder, nor of an installed package")
             composition = compose(command, overrides, multirun=multirun)
         if cfg:
-            console.result(resolve(composition), text=OmegaConf.to_yaml(OmegaConf.create(resolve(composition))))
+            settings = resolve(composition)
+            console.result(settings, text=OmegaConf.to_yaml(OmegaConf.create(_in_order(settings))))
             return 0
         if multirun:
             prepare(resolve(composition), composition.trust)
@@ -60,6 +61,12 @@ def run(
             document = execute(command, line, resolve(composition), console, trust=composition.trust)
         console.result(document, text=summarise(document))
         return int(document.get("exit_code", 0))
+
+
+def _in_order(settings: Mapping[str, Any]) -> dict[str, Any]:
+    """Return settings as a person reads them: the command's own, its components, then groups to which these refer."""
+    ranks = {key: (f"{key}." in REFERRED, isinstance(value, Mapping)) for key, value in settings.items()}
+    return {key: settings[key] for key in sorted(settings, key=ranks.__getitem__)}
 
 
 def summarise(document: Mapping[str, Any]) -> str:

@@ -13,6 +13,7 @@ from hydra._internal.core_plugins.file_config_source import FileConfigSource
 from hydra._internal.sources_registry import SourcesRegistry
 from hydra.core.plugins import Plugins
 from hydra.plugins.config_source import ConfigResult, ConfigSource
+from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from omegaconf.grammar.gen.OmegaConfGrammarParser import OmegaConfGrammarParser
 from omegaconf.grammar_parser import parse
@@ -25,6 +26,7 @@ from gsl.errors import ArtifactError, InputError
 from gsl.storage.manifest import check_files, read, resembles, strange_files
 
 USER = "gsl-user"
+ROBOT = "robot"  # setting of a world
 _HYDRA = "hydra"
 _SELF = "_self_"
 _OWN_FOLDER = "or copy what you have changed into a folder of your own, which holds no manifest.json"
@@ -57,7 +59,19 @@ class BudgetedFiles(FileConfigSource):
             settings = check_file(path, config_path if ours else path.stem)
             if config_path.partition("/")[0] in FILE_GROUPS and TARGET in _words(settings):
                 raise InputError(f"{path}: names a class, as {TARGET}, and a mapping builds none; leave it out")
-        return super().load_config(config_path)
+        result = super().load_config(config_path)
+        if self.provider == USER:
+            _find_robots(result.config, Path(self.path))
+        return result
+
+
+def _find_robots(config: Any, folder: Path) -> None:
+    """Let `robot:` name a file as seen from the folder of --config-dir, wherever the command is typed."""
+    for key in (key for key in config if isinstance(key, str)) if isinstance(config, DictConfig) else ():
+        value = None if OmegaConf.is_missing(config, key) or OmegaConf.is_interpolation(config, key) else config[key]
+        if key == ROBOT and isinstance(value, str) and Path(value).suffix and (folder / value).is_file():
+            config[key] = os.path.relpath(folder / value)
+        _find_robots(value, folder)
 
 
 def check_folder(config_dir: Path) -> None:

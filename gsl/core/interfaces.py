@@ -230,7 +230,7 @@ class SearchRun(Protocol):
     """A search in progress. The same values lead to the same candidates: a killed search goes on from its log."""
 
     def ask(self) -> Sequence[np.ndarray]:
-        """Return the candidates of the next generation, each of shape (n_parameters,)."""
+        """Return the candidates of the next generation, `candidates` arrays of shape (n_parameters,)."""
 
     def tell(self, values: Sequence[float]) -> None:
         """Take the candidates' values in the order of `ask`; larger is better."""
@@ -246,7 +246,7 @@ class Search(Protocol):
 
     @property
     def candidates(self) -> int:
-        """How many a generation has."""
+        """How many a generation has, always: another number is refused."""
 
     def start(self, parameters: np.ndarray, scale: np.ndarray, seed: int) -> SearchRun:
         """Return the search at its beginning.

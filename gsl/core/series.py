@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy
 
 SAME = 1e-6  # stamps that differ by less are one: as numbers, seconds since 1970 are told to 2e-7 [s]
 FINEST = 400  # points of a signal's grid a second, when lags are measured
@@ -52,7 +52,7 @@ def interpolate(stamps: np.ndarray, values: np.ndarray, at: np.ndarray) -> np.nd
     smooth = rising and np.isfinite(values).all(axis=0) & (np.abs(values) < HUGE).all(axis=0)
     inside = np.clip(at, stamps[0], stamps[-1])
     return np.column_stack([
-        CubicSpline(stamps, column)(inside) if spline else np.interp(at, stamps, column)
+        scipy.interpolate.CubicSpline(stamps, column)(inside) if spline else np.interp(at, stamps, column)
         for column, spline in zip(values.T, np.broadcast_to(smooth, values.shape[1]), strict=True)
     ])  # fmt: skip
 

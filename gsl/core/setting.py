@@ -80,7 +80,7 @@ class Setting:
         lower: Lower end of the documented range, or else the least possible value, or None.
         upper: Upper end, likewise.
         most: Greatest possible value, or None.
-        named: Whether it is a mapping whose names nobody declares, such as the arguments of an environment.
+        named: Whether it may be a mapping whose names nobody declares, such as the arguments of an environment.
     """
 
     name: str
@@ -145,8 +145,13 @@ def _describe(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting:
         _first(extra.get("lower"), _bound(field, "ge"), _bound(field, "gt")),
         _first(extra.get("upper"), _bound(field, "le"), _bound(field, "lt")),
         _bound(field, "le"),
-        get_origin(field.annotation) is Mapping and get_args(field.annotation)[1] in (Any, float),
+        any(map(_is_named, (field.annotation, *get_args(field.annotation)))),
     )
+
+
+def _is_named(kind: Any) -> bool:
+    """Whether it is a mapping by names, and not one of components, each of which says its class."""
+    return get_origin(kind) in (Mapping, dict) and not getattr(get_args(kind)[1], "_is_protocol", False)
 
 
 def _bound(field: FieldInfo, name: str) -> float | None:

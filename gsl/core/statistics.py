@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy
 
 
 class Interval(NamedTuple):
@@ -53,7 +53,7 @@ def difference_interval(
 
 def wilson(hits: int, count: int, *, confidence: float = 0.95) -> Interval:
     """Return the share of hits with Wilson's score interval (Wilson 1927)."""
-    z, share = stats.norm.ppf(0.5 + confidence / 2), hits / count
+    z, share = scipy.stats.norm.ppf(0.5 + confidence / 2), hits / count
     centre = (share + z**2 / (2 * count)) / (1.0 + z**2 / count)
     half = z / (1.0 + z**2 / count) * np.sqrt(share * (1.0 - share) / count + z**2 / (4 * count**2))
     return Interval(share, float(max(0.0, centre - half)), float(min(1.0, centre + half)))
@@ -62,7 +62,7 @@ def wilson(hits: int, count: int, *, confidence: float = 0.95) -> Interval:
 def quantile_interval(values: Sequence[float] | np.ndarray, *, confidence: float = 0.95) -> Interval:
     """Return the median of independent values, shape (n,), with the interval of order statistics that holds it."""
     ordered, n = np.sort(np.asarray(values, dtype=float)), len(values)
-    outside = int(stats.binom.ppf((1.0 - confidence) / 2, n, 0.5))
+    outside = int(scipy.stats.binom.ppf((1.0 - confidence) / 2, n, 0.5))
     low, high = max(0, outside - 1), min(n - 1, n - outside)
     return Interval(float(np.median(ordered)), float(ordered[low]), float(ordered[high]))
 
@@ -83,7 +83,7 @@ def rank_correlation(first: np.ndarray, second: np.ndarray) -> float:
     """Return Spearman's rho of two samples of equal length, NaN if one of them does not vary."""
     if np.ptp(first) == 0.0 or np.ptp(second) == 0.0:
         return np.nan
-    return float(stats.spearmanr(first, second).statistic)
+    return float(scipy.stats.spearmanr(first, second).statistic)
 
 
 def bootstrap_interval(
@@ -113,5 +113,5 @@ def bootstrap_interval(
 def _t_interval(mean: float, variance_of_mean: float, freedom: float, confidence: float) -> Interval:
     if not np.isfinite(variance_of_mean):
         return Interval(float(mean), -np.inf, np.inf)
-    half = stats.t.ppf(0.5 + confidence / 2, freedom) * np.sqrt(variance_of_mean)
+    half = scipy.stats.t.ppf(0.5 + confidence / 2, freedom) * np.sqrt(variance_of_mean)
     return Interval(float(mean), float(mean - half), float(mean + half))

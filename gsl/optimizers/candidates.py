@@ -9,26 +9,28 @@ import numpy as np
 from gsl.errors import ConfigError
 
 
-def check_candidates(asked: Any, count: int) -> list[np.ndarray]:
+def check_candidates(asked: Any, count: int, candidates: int) -> list[np.ndarray]:
     """Return candidates as arrays, shape (count,) each.
 
     Args:
         asked: What `ask` has returned.
         count: Parameters of the policy.
+        candidates: How many the optimiser's settings promise.
 
     Raises:
-        ConfigError: There is none, or one has another shape or a number that is not finite.
+        ConfigError: There are more or fewer, or one has another shape or a number that is not finite.
     """
     try:
-        candidates = [np.asarray(candidate, dtype=float) for candidate in asked]
+        arrays = [np.asarray(candidate, dtype=float) for candidate in asked]
     except (TypeError, ValueError) as error:
         raise ConfigError("optimizer", f"its ask() returned no list of candidates: {error}") from error
-    if not candidates:
-        raise ConfigError("optimizer", "its ask() returned no candidate")
-    for candidate in candidates:
+    if len(arrays) != candidates:
+        problem = f"its ask() returned {len(arrays)} instead of the {candidates} candidates of its settings"
+        raise ConfigError("optimizer", problem)
+    for candidate in arrays:
         if candidate.shape != (count,):
             problem = f"its ask() returned a candidate of shape {candidate.shape}; the policy has {count} parameters"
             raise ConfigError("optimizer", problem)
         if not np.isfinite(candidate).all():
             raise ConfigError("optimizer", "its ask() returned a candidate with a number that is not finite")
-    return candidates
+    return arrays

@@ -13,7 +13,7 @@ from gsl.report.diagnosis_policies import policies
 from gsl.report.diagnosis_ranking import causes, ranking
 from gsl.report.diagnosis_replays import replays
 from gsl.report.diagnosis_shrinkage import parts, shrinkage
-from gsl.report.diagnosis_verdict import headline, verdict
+from gsl.report.diagnosis_verdict import headline, summary, verdict
 from gsl.report.diagnosis_where import growth, sides, where
 from gsl.report.diagnosis_words import Document, part
 from gsl.report.page import page
@@ -59,7 +59,7 @@ def report_html(document: Document) -> str:
         mark=_MARKS[kind],
         kicker=" against ".join(sides) or "gsl diagnose",
         headline=headline(document),
-        summary=[prose(str(document["summary"]))] if document.get("summary") else [],
+        summary=[prose(text)] if (text := summary(document)) else [],
         cards=cards(document),
     )
 

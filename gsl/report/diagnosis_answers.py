@@ -7,9 +7,9 @@ from markupsafe import Markup
 from gsl.report.diagnosis_missing import missing_sentence
 from gsl.report.diagnosis_next import Step, steps
 from gsl.report.diagnosis_verdict import (
-    alternatives,
     cause_name,
     comparison_sentence,
+    list_undecided,
     nearest,
     shrinkage_sentence,
     sureness,
@@ -42,7 +42,7 @@ def _aside(document: Document) -> Markup | None:
 
 def _cause(document: Document) -> Markup:
     causes = [_one(cause) for cause in entries(document, "causes")]
-    groups = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
+    groups = list_undecided(document)
     if causes or groups:
         return join(*causes, bullets(groups))
     return element("p", prose(_nothing(document)))

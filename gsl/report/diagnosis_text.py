@@ -13,9 +13,11 @@ from gsl.report.diagnosis_verdict import (
     cause_name,
     comparison_sentence,
     headline,
+    list_undecided,
     nearest,
     places,
     shrinkage_sentence,
+    summary,
     verdict,
 )
 from gsl.report.diagnosis_words import (
@@ -43,7 +45,7 @@ def summary_lines(document: Document) -> list[Table]:
 
 
 def _causes(document: Document) -> Table:
-    summary = "\n".join(filter(None, [str(document.get("summary") or ""), *policy_lines(document)])) or None
+    said = "\n".join(filter(None, [summary(document), *policy_lines(document)])) or None
     if verdict(document) == "wiring":
         findings = [
             (read_word(finding, "kind"), read_word(finding, "sentence")) for finding in entries(document, "wiring")
@@ -54,11 +56,10 @@ def _causes(document: Document) -> Table:
         alike = [("either", alternatives(group)) for group in entries(document, "inseparable")]
         alike += [("nearest", nearest(document))] if nearest(document) else []
         alike += [("missing" if k == 0 else "", line) for k, line in enumerate(list_missing(document))]
-        return Table(headline(document), ("", ""), [*alike, *_shrinkage(document)], summary)
+        return Table(headline(document), ("", ""), [*alike, *_shrinkage(document)], said)
     columns = ("cause", "parameter", "value", "95 % interval", "probability", "of the rest, back without it")
-    caption = [f"{alternatives(group)}: this log cannot tell which" for group in entries(document, "inseparable")]
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
-    lines = "\n".join([*more, *filter(None, [summary]), *caption])
+    lines = "\n".join([*more, *filter(None, [said]), *list_undecided(document)])
     return Table(headline(document), columns, rows[:CAUSES], lines or None)
 
 

@@ -22,6 +22,7 @@ from gsl.report.diagnosis_words import (
     share,
 )
 
+GROUPS = 3  # that the headline names
 VERDICTS = ("no_gap", "causes", "inseparable", "unknown", "wiring")
 
 
@@ -60,7 +61,18 @@ def _causes(document: Document) -> str:
 def _inseparable(document: Document) -> str:
     groups = [alternatives(group) for group in entries(document, "inseparable")]
     sentence = "There is a gap, but this log cannot tell its possible causes apart"
-    return f"{sentence}: {list_words(groups, most=3)}" if groups else sentence
+    return f"{sentence}: {list_words(groups, most=GROUPS)}" if groups else sentence
+
+
+def summary(document: Document) -> str:
+    """Return what the summary says besides the headline and the list of causes; nothing where it is no more."""
+    return "" if verdict(document) in ("inseparable", "unknown") else str(document.get("summary") or "")
+
+
+def list_undecided(document: Document) -> list[str]:
+    """Return the groups of effects that cannot be told apart and that stand in no headline above a list of causes."""
+    groups = entries(document, "inseparable")[GROUPS if entries(document, "causes") else 0 :]
+    return [f"{alternatives(group)}: this log cannot tell which" for group in groups]
 
 
 def _unknown(document: Document) -> str:

@@ -170,10 +170,11 @@ def parameters(change: Change) -> Markup | None:
     order = list(range(len(names)))
     if len(names) > PARAMETERS:
         order = sorted(sorted(order, key=lambda k: -abs(changes[k]))[:PARAMETERS])
-    rows = [(names[k], f"{before[k]:.4g}", f"{after[k]:.4g}", f"{changes[k]:+.2f}") for k in order]
+    numbers = [(f"{before[k]:.4g}", f"{after[k]:.4g}", f"{changes[k]:+.2f}") for k in order]
+    rows = [(names[k], *(cell.replace("-", "−") for cell in row)) for k, row in zip(order, numbers, strict=True)]
     some = f" The {PARAMETERS} most changed of {len(names):,}." if len(names) > PARAMETERS else ""
     note = f"A change is in steps of the search, which are equally bold in each parameter.{some}"
-    shown = table(("parameter", "π0", "returned", "change"), [[cell.replace("-", "−") for cell in row] for row in rows])
+    shown = table(("parameter", "π0", "returned", "change"), rows)
     return section("The policy before and after", shown, note=note)
 
 

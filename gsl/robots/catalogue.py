@@ -81,7 +81,7 @@ def _there(name: str) -> Path:
         where = (
             ""
             if path.is_absolute()
-            else ", as seen from the current folder; the `robot:` of a world is seen from there too"
+            else ", as seen from the current folder; that of a world of yours may be seen from its --config-dir"
         )
         raise InputError(f"{name}: there is no such file{where}")
     return path

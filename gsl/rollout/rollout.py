@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
 import gymnasium
 import numpy as np
 
-from gsl.core.interfaces import Grounding, Policy, Task, World
+from gsl.core.interfaces import Grounding, Policy, PolicyRun, Task, World
 from gsl.core.layout import Layout
 from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError
@@ -68,15 +69,9 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
     """
     layout = scenario.world.layout
     observation, _ = env.reset(seed=seed, options={"posture": scenario.policy.posture(parameters, layout)})
-    try:
-        policy = scenario.policy.start(parameters, layout)
+    policy = start_policy(scenario.policy, parameters, layout)
+    with _needing("task", layout):
         task = scenario.task.start(layout, observation, scenario.role)
-    except KeyError as error:
-        robot, other = "a robot without feet goes with task=excite", "task=own_reward and policy=mlp"
-        hint = f"a gymnasium environment goes with {other}" if layout.states else robot
-        raise ConfigError(
-            "task or policy", f"needs {error.args[0]}, which this world does not observe; {hint}"
-        ) from error
     observations, actions, sent, rewards, ended = [observation], [], [], [], False
     for _ in range(policy.ticks if isinstance(policy, OpenLoopRun) else scenario.ticks):
         action = policy.act(observation)
@@ -92,6 +87,27 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
     trajectory = record(layout, np.array(observations), np.array(actions), np.array(rewards), ended=ended)
     grounded = np.array(sent)
     return trajectory if np.array_equal(grounded, actions) else replace(trajectory, grounded_action=grounded)
+
+
+def start_policy(policy: Policy, parameters: np.ndarray, layout: Layout) -> PolicyRun:
+    """Return a policy at the beginning of an episode.
+
+    Raises:
+        ConfigError: It needs what the world does not observe.
+    """
+    with _needing("policy", layout):
+        return policy.start(parameters, layout)
+
+
+@contextmanager
+def _needing(what: str, layout: Layout) -> Iterator[None]:
+    try:
+        yield
+    except KeyError as error:
+        robot = "a robot without feet takes task=excite in gsl collect; a search needs a policy of your own"
+        other = "a gymnasium environment goes with task=own_reward and policy=mlp"
+        hint = other if layout.states else f"{robot} (docs/howto/own-policy.md)"
+        raise ConfigError(what, f"needs {error.args[0]}, which this world does not observe; {hint}") from error
 
 
 def _record(layout: Layout, states: np.ndarray, actions: np.ndarray, rewards: np.ndarray, *, ended: bool) -> Trajectory:

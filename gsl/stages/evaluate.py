@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from gsl.core.console import Console
 from gsl.core.interfaces import REAL, Policy, Task, World
@@ -200,7 +200,7 @@ def _ahead(done: Sequence[Episode], other: Sequence[Episode]) -> bool:
     values = (np.array([episode.value for episode in episodes]) for episodes in (done, other))
     difference = difference_interval(*values, confidence=2.0 * SURE - 1.0)
     fallen = [(falls(episodes), len(episodes) - falls(episodes)) for episodes in (done, other)]
-    fewer = stats.fisher_exact(fallen, alternative="less").pvalue < 1.0 - SURE
+    fewer = scipy.stats.fisher_exact(fallen, alternative="less").pvalue < 1.0 - SURE
     return bool(difference.lower > 0.0 or (difference.mean > 0.0 and fewer))
 
 

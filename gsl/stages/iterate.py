@@ -25,7 +25,7 @@ from gsl.report.iteration import Rounds, write_curve, write_table
 from gsl.report.iteration_page import Seen, read_check, write_iteration_page
 from gsl.report.run_page import Change
 from gsl.rollout.parallel import Workers
-from gsl.rollout.rollout import Scenario
+from gsl.rollout.rollout import Scenario, start_policy
 from gsl.stages.chain import Budget
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import EXCITATION, DiagnosisPlan, flown
@@ -103,6 +103,8 @@ class Iterate:
         check_aggregate(self, [self.grounding], "aggregate")
         self.chain.check(self.grounding)
         try_out({"sim": self.sim, "real": self.real})
+        for world in (self.sim, self.real):
+            start_policy(self.policy, self.policy.initial, world.layout)
         home, rounds, first = folder.parent, Rounds(self.task), self.grounding
         parts, message = foresee(self)
         if message:

@@ -140,7 +140,7 @@ class Optimize:
         error, highest = optimizer.race if isinstance(optimizer, Racing) else 0.0, -np.inf
         with console.progress(total, "optimising in simulation") as progress:
             for index in range(optimizer.generations):
-                candidates = check_candidates(search.ask(), len(first))
+                candidates = check_candidates(search.ask(), len(first), optimizer.candidates)
                 generation = log.read(index)
                 if generation is None:
                     generation = self._evaluate(scenario, candidates, index, progress, error)

@@ -23,7 +23,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from gsl.core.plant import Plant
 from gsl.diagnosis.log.log import Log
@@ -206,12 +206,12 @@ def width(sums: Moments, floor: np.ndarray) -> TorqueWidth:
     free = np.where(some, sums.ticks - 1, 0)
     over = float((sums.rest / square)[some].sum() / free.sum())
     step = 0.0
-    if over > (1.0 + SLACK) * stats.chi2.ppf(CONFIDENCE, free.sum()) / free.sum():
+    if over > (1.0 + SLACK) * scipy.stats.chi2.ppf(CONFIDENCE, free.sum()) / free.sum():
         part = (sums.step_rest - sums.step_rough * free)[some].sum()
         step = max(0.0, float((sums.rest - square * free)[some].sum() / part))
     noise = np.maximum(square - step * sums.step_rough, LEFT * square) + step * sums.step_along
     constant, count = 0.0, int(some.sum())
-    if float((sums.along / noise)[some].sum()) > (1.0 + SLACK) * stats.chi2.ppf(CONFIDENCE, count):
+    if float((sums.along / noise)[some].sum()) > (1.0 + SLACK) * scipy.stats.chi2.ppf(CONFIDENCE, count):
         constant = max(0.0, float((sums.along - noise)[some].sum() / sums.constant[some].sum()))
     return TorqueWidth(float(np.sqrt(step)), float(np.sqrt(constant)))
 

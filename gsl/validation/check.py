@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from gsl.core.observation import missing
 from gsl.core.seeds import derive_seed
@@ -31,7 +31,7 @@ ALPHAS = (1.0, 0.9, 0.8, 0.7, 0.6, 0.5, 0.4, 0.3)
 def count_allowed_falls(heldout: Batch) -> int:
     """Return how often π0 may fall in the grounded simulator: not surely more often than by its share in real."""
     share = float(heldout.metadata.get(FALLS, 0.0))
-    return max(k for k in range(EPISODES + 1) if stats.binom.sf(k - 1, EPISODES, share) >= SURELY)
+    return max(k for k in range(EPISODES + 1) if scipy.stats.binom.sf(k - 1, EPISODES, share) >= SURELY)
 
 
 def check(scenario: Scenario, parameters: np.ndarray, heldout: Batch, seed: int) -> GroundingReport:

@@ -82,6 +82,7 @@ def test_a_stage_is_the_same_from_python_and_from_the_command_line(elsewhere: Pa
 def test_a_component_goes_as_it_is(elsewhere: Path) -> None:
     world = gsl.make_world("nao_ideal", effects={"torque_limit": {"factor": 0.5}})
     made = gsl.run("collect", world=world, preset="toy", name="mine", workers=1, task={"duration": 0.6})
+    assert made.page == made.folder / "report.html"
     assert made.artifact.config["world"]["effects"] == {"torque_limit": {"factor": 0.5}}
 
 
@@ -103,6 +104,9 @@ def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
     assert 'iframe srcdoc="' in findings._repr_html_()
     assert 'sandbox="allow-scripts"' in findings._repr_html_()  # of an origin of its own: not the notebook's
     assert "command_latency" in findings.world.effects  # type: ignore[attr-defined]
+    assert findings.page == findings.folder / "report.html"
+    delay = findings.suspects.set_index("parameter").loc["delay"]
+    assert (delay.effect, delay.unit) == ("command_latency", "s") and delay.low < delay.value < delay.high
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,13 @@ def test_the_composed_configuration_can_be_looked_at(elsewhere: Path, capsys: py
     assert not (elsewhere / "runs").exists()
 
 
+def test_what_is_looked_at_begins_with_the_settings_of_the_command(capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["evaluate", "--cfg", "job", "subject=s"]) == 0
+    shown = yaml.safe_load(capsys.readouterr().out)
+    assert [isinstance(value, dict) for value in shown.values()] == sorted(isinstance(v, dict) for v in shown.values())
+    assert [*shown][-1] == "preset" and {"name", "episodes"} < {*shown}
+
+
 def test_an_experiment_is_a_whole_scenario(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["collect", "--cfg", "job", "--json", "experiment=long"]) == 0
     assert json.loads(capsys.readouterr().out)["episodes"] == 9

@@ -9,6 +9,8 @@ import pytest
 import yaml
 from commands import done, gsl, refused
 
+from gsl.api import make_world
+from gsl.errors import InputError
 from gsl.robots.catalogue import robot
 
 pytestmark = pytest.mark.slow
@@ -44,7 +46,20 @@ def test_it_writes_out_what_the_urdf_alone_would_give(place: Path, monkeypatch: 
         assert written.joint(name).armature == pytest.approx(alone.joint(name).armature, rel=1e-3)
         assert written.gains[name] == pytest.approx(alone.gains[name], rel=1e-3)
     world = yaml.safe_load((place / "some/where/world/mine.yaml").read_text())
-    assert (world["robot"], world["period"]) == ("some/where/robot.yaml", 0.005)
+    assert (world["robot"], world["period"]) == ("robot.yaml", 0.005)
+
+
+def test_its_world_is_at_home_in_its_folder(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    done("init", "urdf=models/arm.urdf", "name=mine", folder=place)
+    before = (place / "mine/world/mine.yaml").read_text().replace("robot: robot.yaml", "robot: mine/robot.yaml")
+    (place / "mine/world/before.yaml").write_text(before)  # as seen from where the command is typed
+    (place / "notebooks").mkdir()
+    monkeypatch.chdir(place / "notebooks")
+    assert make_world("mine", config_dir="../mine").robot == "../mine/robot.yaml"  # type: ignore[attr-defined]
+    with pytest.raises(InputError, match="no such file, as seen from the current folder; that of a world of yours"):
+        make_world("before", config_dir="../mine")
+    monkeypatch.chdir(place)
+    assert make_world("before", config_dir="mine").robot == "mine/robot.yaml"  # type: ignore[attr-defined]
 
 
 def test_it_takes_torque_and_speed_for_placeholders_and_a_choice_of_joints(place: Path) -> None:
@@ -108,13 +123,19 @@ def test_an_edited_urdf_is_noticed_and_a_moved_one_is_not(place: Path) -> None:
         ("world=nao_ideal world.robot=models/arm.urdf", "the arm has no feet to stand on; say floating=false"),
         (
             "world=so101 preset=toy workers=1",
-            "needs foot_force, which this world does not observe; a robot without feet",
+            "policy: needs foot_force, which this world does not observe; a robot without feet",
         ),
         ("world=nao_ideal world.robot=models/arm", "no robot called 'models/arm'"),
     ],
 )
 def test_a_world_without_its_robot(arguments: str, line: str, place: Path) -> None:
     assert line in refused("collect", *arguments.split(), folder=place)
+
+
+def test_a_policy_for_feet_is_refused_before_anything_is_collected(place: Path) -> None:
+    line = refused("iterate", "sim=so101", "real=so101", "preset=toy", "workers=1", "name=none", folder=place)
+    assert line.startswith("policy: needs foot_force, ") and "docs/howto/own-policy.md" in line
+    assert not (place / "runs/none/iteration_01").exists()
 
 
 def test_a_log_that_lacks_a_joint(place: Path) -> None:

@@ -15,9 +15,10 @@ from commands import ENVIRONMENT, done, gsl, refused
 
 from gsl import make_world
 from gsl.commandline.help import write_help
+from gsl.core.configuration import list_worlds
 from gsl.core.plant import nominal
 from gsl.diagnosis.hypothesis.candidates import library
-from gsl.effects.effect import apply_all, build, effect_class, names, own, use_own
+from gsl.effects.effect import apply_all, build, effect_class, list_unusual, names, own, use_own
 from gsl.errors import ConfigError
 from gsl.robots.nao import nao
 from gsl.testing import check_effect
@@ -89,6 +90,22 @@ def test_it_is_searched_within_its_documented_range(mine: type) -> None:
     (candidate,) = (entry for entry in library(nao()) if entry.effect == NAME)
     np.testing.assert_array_equal(candidate.documented, [[0.0], [1.0]])
     assert candidate.free == ("thickness",) and candidate.scope == "all"
+
+
+@pytest.mark.parametrize(
+    "effect", [f"{NAME}.thickness=3.9", "backlash.width=0.1", "servo_gain.kp=0", f"{NAME}.thickness=5"]
+)
+def test_a_value_far_from_its_documented_range_is_a_warning(effect: str, home: Path) -> None:
+    words = (*OWN, *QUICK, "world=nao_ideal", f"world.effects.{effect}", "name=far", "force=true")
+    line = f"warning: world.effects.{NAME}.thickness = 5: far from its documented range, 0 to 1\n"
+    assert (line in done("collect", *words, folder=home).err) == effect.endswith("=5")
+
+
+@pytest.mark.parametrize("name", sorted(list_worlds() - {"gymnasium", "learned", "urdf"}))
+def test_no_value_of_our_worlds_is_far_from_its_documented_range(name: str) -> None:
+    world = make_world(name)
+    effects, plant = getattr(world, "effects", {}), getattr(world, "plant", None)
+    assert plant is None or not [*list_unusual(effects, plant.robot)]
 
 
 def test_stages_take_it_from_the_folder(home: Path) -> None:

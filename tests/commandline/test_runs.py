@@ -82,6 +82,16 @@ def test_runs_are_chosen_by_one_word(word: str, left: list[str], home: Path) -> 
     assert listed(word, "sort=name", folder=home) == left
 
 
+def test_a_run_is_found_by_the_world_that_it_had_by_default(home: Path) -> None:
+    world = {"_target_": "gsl.worlds.bullet.BulletWorld", "robot": "nao", "effects": {"torque_limit": {"factor": 0.75}}}
+    stage = Measuring("evaluate", {"falls": 1}, {})
+    build(stage, config={"world": {**world, "step": 0.001}}, out=Path("runs/weak/evaluate"), command="gsl evaluate",
+          force=False, console=None)  # type: ignore[arg-type]  # fmt: skip
+    assert listed("world=nao_weak", folder=home) == ["weak/evaluate"]
+    assert "no artifact below runs/ has it" in refused("runs", "world=nao_ideal", folder=home)
+    assert "other artifacts have of.falls" in done("runs", "metric=falls", folder=home).out
+
+
 @pytest.mark.parametrize(
     ("word", "line"),
     [

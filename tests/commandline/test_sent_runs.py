@@ -134,6 +134,9 @@ NAMED = "a file of your own is taken by its name"
         ("carpet.yaml", f"{NAMED}: carpet, with --config-dir FOLDER, in which it is world/carpet.yaml"),
         ("runs/a/import", f"{NAMED}: mine, with --config-dir runs/a/import"),
         ("a/import", f"{NAMED}: mine, with --config-dir runs/a/import"),
+        ("my_conf/robot.yaml", f"{NAMED}: mine, with --config-dir my_conf"),
+        ("arm.urdf", "a robot is a setting of the world urdf: world=urdf world.robot=arm.urdf"),
+        ("mine", "it is in my_conf: say --config-dir my_conf"),
         ("nao_wron", "did you mean nao_worn or "),
     ],
 )

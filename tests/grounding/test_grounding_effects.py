@@ -148,7 +148,11 @@ def test_optimising_with_an_effect_as_grounding_is_optimising_in_the_world_that_
 
 def test_a_grounding_names_what_is_missing(tmp_path: Path) -> None:
     said = gsl("optimize", *SMALL, "name=x", "grounding=effects", folder=tmp_path)
-    assert (said.code, said.lines) == (2, ["gsl optimize: x/diagnose: there is no such path and no such run in runs"])
+    nothing = "gsl optimize: x/diagnose: there is no such path and no such run in runs"
+    assert (said.code, said.lines) == (2, [f"{nothing}; grounding.diagnosis=RUN takes another run's"])
+    assert gsl("optimize", *SMALL, "name=x", "grounding=effects", "grounding.diagnosis=y", folder=tmp_path).lines == [
+        nothing.replace("x/diagnose", "y")
+    ]
 
 
 def test_effects_and_a_transformation_are_one_choice() -> None:

@@ -1,7 +1,10 @@
 """The chain of single commands as the Makefile puts it together; nothing is run."""
 
+import os
+import shlex
 import shutil
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -51,3 +54,14 @@ def test_help_names_every_target() -> None:
     made = subprocess.run(["make", "help"], cwd=ROOT, check=True, capture_output=True, text=True)
     for target in ("demo", "test", "iterate", "check", "clean", "help"):
         assert f"make {target} " in made.stdout
+
+
+@pytest.mark.slow
+def test_an_installation_writes_the_help_that_would_else_take_seconds(tmp_path: Path) -> None:
+    made = subprocess.run(["make", "-n", "-B", "install"], cwd=ROOT, check=True, capture_output=True, text=True)
+    program = next(words[2] for line in made.stdout.splitlines() if (words := shlex.split(line))[1:2] == ["-c"])
+    environment = {**os.environ, "XDG_CACHE_HOME": str(tmp_path)}
+    subprocess.run([sys.executable, "-c", program], cwd=ROOT, env=environment, check=True, stdout=subprocess.DEVNULL)
+    look = "import sys; from gsl.cli import call; call(['iterate', '--help']); sys.exit('hydra' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", look], cwd=ROOT, env=environment, capture_output=True, text=True)
+    assert (done.returncode, "Settings (KEY=VALUE):" in done.stdout) == (0, True)

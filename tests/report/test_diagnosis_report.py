@@ -69,6 +69,18 @@ def test_a_cause_that_is_not_sure_is_called_probable() -> None:
     assert "Possible cause: servo gain of LKneePitch" in words(report_html(unlikely)).split("Caveats")[0]
 
 
+def test_what_cannot_be_told_apart_is_said_once() -> None:
+    undecided = {**made.document(causes=2), "verdict": "inseparable", "inseparable": [["servo_gain", "torque_limit"]]}
+    undecided["summary"] = "The gap looks like servo gain, but this log cannot tell apart: servo gain or torque limit."
+    answers = words(report_html(undecided)).split("What causes it?")
+    assert "this log cannot tell its possible causes apart: servo gain or torque limit" in answers[0]
+    assert "looks like" not in answers[0] and "cannot tell" not in answers[1].split("What next?")[0]
+    (first, *_) = summary_lines(undecided)
+    assert "cannot tell" in first.title and "cannot tell" not in (first.caption or "")
+    many = {**undecided, "inseparable": [["servo_gain", "torque_limit"]] * 3 + [["deadband", "backlash"]]}
+    assert "deadband or backlash: this log cannot tell which" in words(report_html(many))
+
+
 def test_the_first_screen_answers_everything() -> None:
     first = words(report_html(made.document())).split("Caveats")[0]
     assert "2 causes found: servo gain of LKneePitch and command latency of all joints" in first

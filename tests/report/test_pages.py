@@ -55,7 +55,7 @@ METRICS = {
     "best": "generation_01", "best_generation": 1, "returned": BEST, "baseline": PI0, "real_episodes": 18,
     "gain": {"value": 0.02, "interval": [0.004, 0.036], "share": 0.1}, "failed_check": [],
 }  # fmt: skip
-CHANGE = Change(("step", "swing"), (0.2, 1.0), (0.25, 0.9), (0.1, 0.5))
+CHANGE = Change(("step-x", "swing"), (0.2, 1.0), (0.25, 0.9), (0.1, 0.5))
 
 
 def written(folder: Path, metrics: dict[str, Any] = METRICS) -> str:
@@ -68,7 +68,7 @@ def test_an_evaluation_says_its_gain_with_its_interval_and_shows_what_the_table_
     assert "generation_01 reaches 21.0 cm/s (95 % 20.0 to 22.0) on the real side, π0 19.0: " in said
     assert "the gain over π0, +2.0 cm/s (95 % +0.4 to +3.6), is significant." in said
     assert "generation_02 5.0 1 of 3" in said and "generation_01, fresh 21.0 20.0 to 22.0 0 of 3" in said
-    assert "step 0.2 0.25 +0.50" in said and "swing 1 0.9 −0.20" in said
+    assert "step-x 0.2 0.25 +0.50" in said and "swing 1 0.9 −0.20" in said
     assert "episodes to choose 9 episodes to check 3 fresh episodes to report 6 in all 18" in said
     assert "fell on the real side" in said  # marked in the learning curve
 

@@ -242,6 +242,36 @@ def test_names_that_the_command_line_cannot_read_come_with_their_quotes(tmp_path
         (tmp_path / name).rename(tmp_path / "log.csv")
 
 
+@pytest.mark.parametrize(
+    ("typed", "quoted"),
+    [
+        ("mapping.name={take}", 'mapping.name="{take}"'),
+        ("mapping.path=a{date}/{motion}", 'mapping.path="a{date}/{motion}"'),
+        ("mapping.signals.position={column: [a{joint}, b]}", 'mapping.signals.position={column: ["a{joint}", b]}'),
+    ],
+)
+def test_places_in_a_text_come_with_their_quotes(tmp_path: Path, typed: str, quoted: str) -> None:
+    line = refused("import", "source=log.csv", typed, folder=tmp_path)
+    assert line.endswith(f"such characters take quotes inside those of the shell: '{quoted}'")
+    assert "cannot be read" not in refused("import", "source=log.csv", quoted, folder=tmp_path)
+    assert refused("import", "source=log.csv", "mapping.name={take", folder=tmp_path).endswith("cannot be read")
+
+
+@pytest.mark.parametrize("word", ["voltage={column: time, unit: V}", "own={column: time, unit: s}", "velocity.bits=16"])
+def test_signals_that_a_mapping_does_not_name_can_be_typed(tmp_path: Path, word: str) -> None:
+    plain_csv(tmp_path, TIME)
+    done("import", "source=log.csv", f"mapping.signals.{word}", "--check", folder=tmp_path)
+    line = refused("import", "source=log.csv", "mapping.signals.velocity.bit=16", folder=tmp_path)
+    assert line == "mapping.signals.velocity.bit: no such setting; did you mean bits?"
+    line = refused("import", "source=log.csv", "mapping.signals.position.unit=deg", folder=tmp_path)
+    assert line.endswith("""with a unit it is 'mapping.signals.position={column: "position.{joint}", unit: ...}'""")
+
+
+def test_a_mapping_that_is_named_without_its_ending_is_offered(tmp_path: Path) -> None:
+    mapping(tmp_path)
+    assert refused("import", "source=log.csv", "mapping=m", folder=tmp_path).endswith("; yours is mapping=m.yaml")
+
+
 def test_a_folder_called_by_a_number_comes_with_its_quotes(tmp_path: Path) -> None:
     line = refused("import", "source=20", mapping(tmp_path), folder=tmp_path)
     assert line == "source = 20: must be a text; in quotes inside those of the shell it is: '\"20\"'"

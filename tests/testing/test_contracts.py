@@ -416,7 +416,7 @@ class Narrow(Deaf):
         (Deaf(), "does not depend on the values"),
         (Seedless(), "does not depend on its seed"),
         (Restless(), "asks for other candidates for the same values again"),
-        (Fewer(), "asked for 2 candidates and not for the 3 of its settings"),
+        (Fewer(), "returned 2 instead of the 3 candidates of its settings"),
         (Narrow(), r"its ask\(\) returned a candidate of shape \(4,\)"),
     ],
 )

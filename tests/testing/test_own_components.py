@@ -330,13 +330,14 @@ def test_after_an_edit_of_ones_class_it_learns_anew(iterated: Path, home: Path) 
             "[step[:3] for step in steps]",
             "optimizer: its ask() returned a candidate of shape (3,); the policy has",
         ),
-        ("[]", "optimizer: its ask() returned no candidate"),
+        ("[]", "optimizer: its ask() returned 0 instead of the "),
         ("None", "optimizer: its ask() returned no list of candidates: "),
         (
             "[np.nan * step for step in steps]",
             "optimizer: its ask() returned a candidate with a number that is not",
         ),
         ("[1 / 0]", "own_bad_4.Run.ask failed (own_bad_4.py, line 29): ZeroDivisionError: division by zero"),
+        ("[self.best + step for step in steps[1:]]", "optimizer: its ask() returned 2 instead of the 3 candidates"),
     ],
 )
 def test_what_an_optimiser_asks_for_is_checked(

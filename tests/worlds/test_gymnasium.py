@@ -584,7 +584,7 @@ def test_worlds_that_no_policy_fits_both_of_are_refused(tmp_path: Path) -> None:
         ("optimize world=gymnasium world.env_id=CartPole-v1 task=own_reward grounding=ane policy=mlp",
          "grounding: its noise is for actions that are numbers"),
         ("collect world=gymnasium world.env_id=CartPole-v1 policy=mlp workers=1",
-         "task or policy: needs base.position, which this world does not observe"),
+         "task: needs base.position, which this world does not observe"),
         ("collect world=cliff_walking task=own_reward policy=action_table action_noise=1.5",
          "action_noise = 1.5: is the chance of a random choice here"),
         ("collect world=gymnasium task=own_reward policy=mlp", "world.env_id: has no value"),

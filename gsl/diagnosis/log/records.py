@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import savgol_filter
+import scipy
 from scipy.spatial.transform import Rotation
 
 from gsl.core.body import Robot
@@ -168,7 +168,9 @@ def slope(position: np.ndarray, period: float) -> np.ndarray:
     if not np.isfinite(position).all():
         return np.full_like(position, np.nan)
     length = min(SMOOTHER, len(position) - (len(position) + 1) % 2)
-    return savgol_filter(position, length, min(3, length - 1), deriv=1, delta=period, axis=0, mode="interp")
+    return scipy.signal.savgol_filter(
+        position, length, min(3, length - 1), deriv=1, delta=period, axis=0, mode="interp"
+    )
 
 
 class OnGround(NamedTuple):

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.signal import correlate
+import scipy
 
 from gsl.diagnosis.log.records import Record
 from gsl.diagnosis.settings import RepeatSettings
@@ -107,7 +107,7 @@ def _compare(first: np.ndarray, again: np.ndarray, period: float, how: RepeatSet
 def _align(first: np.ndarray, again: np.ndarray, most: int) -> int:
     """Return the whole rows, at most so many, by which commands are later where they are most alike."""
     a, b = (part - part.mean(axis=0) for part in (first, again))
-    alike = sum(correlate(b[:, k], a[:, k], method="fft") for k in range(a.shape[1]))
+    alike = sum(scipy.signal.correlate(b[:, k], a[:, k], method="fft") for k in range(a.shape[1]))
     lags = np.arange(1 - len(a), len(b))
     own = np.abs(lags) <= most
     best = alike[own] >= alike[own].max() - ROUNDING * np.abs(alike[own]).max()
