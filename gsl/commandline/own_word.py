@@ -60,12 +60,12 @@ def find_misspelt(arguments: Sequence[str]) -> list[str]:
 def _is_there(module: str) -> bool:
     """Whether a module can be imported, without importing it or what it lies in."""
     places: Sequence[str] | None = [os.getcwd(), *sys.path]
-    words = module.split(".")
-    for count in range(1, len(words) + 1):
-        spec = None if places is None else PathFinder.find_spec(".".join(words[:count]), places)
+    for word in module.split("."):
+        # a folder without __init__.py asks for its parent among what is imported, unless it seems to have none
+        spec = None if places is None else PathFinder.find_spec(word, places)
         if spec is None:
             return False
-        places = spec.submodule_search_locations
+        places = None if spec.submodule_search_locations is None else [*spec.submodule_search_locations]
     return True
 
 

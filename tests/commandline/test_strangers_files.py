@@ -196,6 +196,10 @@ def test_a_misspelt_module_to_trust_is_named(place: Path) -> None:
     assert said.err.count("warning: trust=") == 1
     assert "warning: trust=evli is no module of this folder, nor of an installed package" in said.err
     assert "trust=evil.Thing is no module" in gsl("import", "trust=evil.Thing", "--check", folder=place).err
+    (place / "far/away").mkdir(parents=True)  # without __init__.py
+    (place / "far/away/mine.py").touch()
+    said = gsl("import", "source=log.csv", "trust=[far.away.mine,far.away.none]", "--check", folder=place)
+    assert "far.away.none is no module" in said.err and "far.away.mine" not in said.err
     assert refused("import", "trsut=evil", "--check", folder=place) == "trsut: no such setting; did you mean trust?"
 
 
