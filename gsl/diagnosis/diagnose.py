@@ -131,7 +131,7 @@ def _search(
         reasons = refute(selection.chosen, log, problem.simulator.plant, options.plausibility)
         if not (log.walking or log.shaking_share):  # where derivatives mean little, so do intervals
             remaining = selection.chosen.level / (how.noise_cost * (1.0 + log.noise.slack))
-            reasons |= find_idle(selection.chosen, options.verdict.widening(remaining))
+            reasons |= find_idle(selection.chosen, options.verdict.widening(remaining), log.robot)
         if not reasons:
             selection = search.look_again(selection)
             problem.memory.clear()

@@ -174,10 +174,8 @@ class CrossValidate:
         )  # fmt: skip
         log, plant = with_log_in_angles(log, self.sim.plant)
         findings = diagnose(self._rest(log, values), plant, self.sim.step, options, PhaseReporter(console))
-        exp, chosen = (
-            prepare(log, lump(plant.robot), replace(options, held_out={self.by: values})),
-            findings.selection.chosen,
-        )
+        exp = prepare(log, lump(plant.robot), replace(options, held_out={self.by: values}))
+        chosen = findings.selection.chosen
         before = findings.simulator.simulate({}, no_shifts(len(exp.joints)), exp.pieces)
         after = findings.simulator.simulate(chosen.effects, chosen.fit.shifts, exp.pieces)
         causes = [chosen.names[cause.index] for cause in findings.verdict.causes]

@@ -101,6 +101,10 @@ class Candidate:
         joints = list_scope(robot, self.scope) if self.on_joints else []
         return [say(robot, joints, settings[name].unit) for name in self.free]
 
+    def tell(self, robot: Robot, values: np.ndarray) -> np.ndarray:
+        """Return values of the free parameters, shape (..., p), as a reader is told them."""
+        return values * [factor for factor, _ in self.say(robot)]
+
     def on(self, joints: str) -> Candidate:
         """Return the same on other joints."""
         return replace(self, fixed={**self.fixed, "joints": joints})

@@ -174,13 +174,10 @@ def _causes(findings: Findings) -> Iterator[str]:
         return
     selection, chosen = findings.selection, findings.selection.chosen
     for candidate, values in chosen.pairs:
-        told = candidate.say(findings.log.robot)
-        for free, (factor, _), value, low, high in zip(
-            candidate.free, told, values, *candidate.documented, strict=True
-        ):
+        told = candidate.tell(findings.log.robot, np.vstack([values, candidate.documented]))
+        for free, value, low, high in zip(candidate.free, *told, strict=True):
             if not low <= value <= high:
-                ends = f"{factor * low:g} to {factor * high:g}"
-                yield f"{_words(candidate, free)} of {factor * value:.3g} is beyond what is documented, {ends}."
+                yield f"{_words(candidate, free)} of {value:.3g} is beyond what is documented, {low:g} to {high:g}."
     larger = next((fit for fit in selection.tried if _extends(fit.places, chosen.places)), None)
     why = None if larger is None else selection.objection(larger)
     if larger is not None and why is not None:
@@ -192,10 +189,12 @@ def _otherwise(robot: Robot, chosen: Hypothesis, larger: Hypothesis, why: str) -
     parameters = {(candidate.effect, candidate.scope): values for candidate, values in larger.pairs}
     further = ", ".join(effect.replace("_", " ") for effect in larger.names if effect not in chosen.names)
     instead = [
-        f"{_words(candidate, free)} {factor * other:.3g} instead of {factor * value:.3g}"
+        f"{_words(candidate, free)} {other:.3g} instead of {value:.3g}"
         for candidate, here in chosen.pairs
-        for free, (factor, _), value, other in zip(
-            candidate.free, candidate.say(robot), here, parameters[candidate.effect, candidate.scope], strict=True
+        for free, value, other in zip(
+            candidate.free,
+            *candidate.tell(robot, np.vstack([here, parameters[candidate.effect, candidate.scope]])),
+            strict=True,
         )
     ]
     return (

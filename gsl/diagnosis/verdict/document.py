@@ -182,8 +182,8 @@ def _ranking(findings: Findings) -> list[dict[str, Any]]:
 
 
 def _write(robot: Robot, candidate: Candidate, values: np.ndarray) -> str:
-    told = _parameters(robot, candidate, values, np.array([values, values]))
-    return ", ".join(f"{name} {parameter['value']:.3g}" for name, parameter in told.items())
+    told = zip(candidate.free, candidate.tell(robot, values), strict=True)
+    return ", ".join(f"{name} {value:.3g}" for name, value in told)
 
 
 def _ways(log: Log) -> np.ndarray:
