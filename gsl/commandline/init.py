@@ -195,9 +195,8 @@ def _tell(folder: Path, asked: Init, robot: Robot, console: Console) -> None:
     following = [
         f"gsl robot {shlex.quote(files[0])}   # a picture",
         f"gsl collect --config-dir {mine} world={name} task=excite name={name}_sim   # safe motions",
+        f"gsl diagnose --config-dir {mine} sim={name} real=LOG name={name}   # a log of the real one",
     ]
-    if not robot.slides:  # which no diagnosis takes yet
-        following.append(f"gsl diagnose --config-dir {mine} sim={name} real=LOG name={name}   # a log of the real one")
     joints = f"{robot.name}: {len(robot.controlled)} controlled joints, {', '.join(robot.controlled)}"
     period = f"its control period is {asked.period:g} s; if your logs have another, write it into the world's file"
     lines = [joints, *(f"remark: {remark}" for remark in robot.remarks), *files, period, "", "what to type next:"]

@@ -64,7 +64,7 @@ class Joint:
 
     Attributes:
         origin: Of the child's frame in the parent's axes [m], shape (3,).
-        axis: Unit vector, shape (3,).
+        axis: Unit vector, or as long as `lever`, shape (3,).
         lower, upper: Position limits [rad].
         max_velocity: [rad/s].
         effort: Peak torque [N·m].
@@ -91,7 +91,13 @@ class Joint:
 
         Margins, amplitudes and noise that are said in radians are by so much smaller for a slide.
         """
-        return min(LONGEST, (self.upper - self.lower) / _USUAL) if self.slides else 1.0
+        lever = self.lever
+        return min(LONGEST, lever * (self.upper - self.lower) / _USUAL) / lever if self.slides else 1.0
+
+    @property
+    def lever(self) -> float:
+        """Metres in the unit of a slide's position: 1, or its size in angles (`core.slides`); 1 of a hinge."""
+        return float(np.linalg.norm(self.axis)) if self.slides else 1.0
 
 
 @dataclass(frozen=True)

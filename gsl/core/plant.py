@@ -125,7 +125,9 @@ def hardness(robot: Robot) -> np.ndarray:
         if joint.parent in moved:
             moved[joint.parent] += moved[joint.child]
     joints = [robot.joint(name) for name in robot.motors]
-    return np.array([_HARD * (moved[joint.child] + joint.armature) if joint.slides else 1.0 for joint in joints])
+    return np.array(
+        [_HARD * (moved[joint.child] * joint.lever**2 + joint.armature) if joint.slides else 1.0 for joint in joints]
+    )
 
 
 def nominal(robot: Robot) -> Plant:

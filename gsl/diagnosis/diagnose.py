@@ -9,6 +9,7 @@ import numpy as np
 from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
+from gsl.diagnosis.angles import with_log_in_angles
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.hypothesis.problem import LATENCY, Problem
 from gsl.diagnosis.log.files import on_ground
@@ -49,6 +50,9 @@ def diagnose(
         tick: Called with a phase when it begins, and with an empty word whenever some work is done.
         reference: A log without the effect, on which the nominal is calibrated first.
     """
+    if reference is not None:
+        reference = with_log_in_angles(reference, plant)[0]
+    batch, plant = with_log_in_angles(batch, plant)
     nominal, baseline, shift = Nominal(plant, step), None, 0.0
     log = _widen_floor(prepare(batch, lump(plant.robot), options), nominal, options)
     if reference is not None:
@@ -127,7 +131,7 @@ def _search(
         reasons = refute(selection.chosen, log, problem.simulator.plant, options.plausibility)
         if not (log.walking or log.shaking_share):  # where derivatives mean little, so do intervals
             remaining = selection.chosen.level / (how.noise_cost * (1.0 + log.noise.slack))
-            reasons |= find_idle(selection.chosen, options.verdict.widening(remaining))
+            reasons |= find_idle(selection.chosen, options.verdict.widening(remaining), log.robot)
         if not reasons:
             selection = search.look_again(selection)
             problem.memory.clear()

@@ -9,6 +9,7 @@ import numpy as np
 
 from gsl.core.plant import Plant, nominal
 from gsl.core.servo import numbers
+from gsl.core.slides import unit_of_slide
 
 UNLIMITED = 1e6  # a torque limit or speed beyond which there is none
 
@@ -70,9 +71,10 @@ def _servo(plant: Plant) -> Iterator[tuple[str, str]]:
         if acting:
             joint = plant.robot.motors[acting[0]]
             rest = f" and {len(acting) - 1} more joints" if len(acting) > 1 else ""
+            unit = unit_of_slide(number.unit) if joint in plant.robot.slides else number.unit
             yield (
                 name,
-                f"{name} ({number.meaning}): {values[acting[0]]:.4g} {number.unit} at {joint}{rest}".replace("  ", " "),
+                f"{name} ({number.meaning}): {values[acting[0]]:.4g} {unit} at {joint}{rest}".replace("  ", " "),
             )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from gsl.core.servo import numbers
+from gsl.core.slides import unit_of_slide
 from gsl.export.parts import Export, Simulator, by_joint, unheld
 from gsl.storage.documents import pretty
 
@@ -16,6 +17,7 @@ def export_json(simulator: Simulator) -> Export:
         name: {
             "meaning": number.meaning,
             "unit": number.unit,
+            **({"unit_of_slides": unit_of_slide(number.unit)} if plant.robot.slides else {}),
             "joints": {
                 joint: value if np.isfinite(value) else None
                 for joint, value in by_joint(plant, getattr(plant.servo, name)).items()
@@ -26,6 +28,7 @@ def export_json(simulator: Simulator) -> Export:
     document = {
         "robot": plant.robot.name,
         "joints": list(plant.robot.motors),
+        "slides": list(plant.robot.slides),
         "step": simulator.step,
         "control_period": simulator.period,
         "gravity": plant.gravity.tolist(),

@@ -26,21 +26,21 @@ import torch
 
 NUMBERS = json.load(open("{name}_servo.json"))
 LAW = torch.jit.load("{name}_servo.pt")
-N = {{key: np.array(list(values.values())) for key, values in NUMBERS["joints"].items()}}
+N = {{key: np.array([values[name] for name in NUMBERS["order"]]) for key, values in NUMBERS["joints"].items()}}
 
 
 def torque(targets, q, v, bristle, dahl, step):
     """targets: what was commanded 0, {lag:g}, ... {last:g} s before (now - delay) [rad], shape ({lags}, n)."""
     errors = targets + N["offset"] - q
-    bristle[:] = np.clip(bristle + v * step, -{bristle:g}, {bristle:g})
-    dahl[:] = np.clip(dahl + v * step, -{bristle:g}, {bristle:g})
+    bristle[:] = np.clip(bristle + v * step, -N["bristle"], N["bristle"])
+    dahl[:] = np.clip(dahl + v * step, -N["bristle"], N["bristle"])
     inputs = [torch.tensor(part, dtype=torch.float32)[None] for part in (errors.T, v, bristle)]
     drive, output = (part[0].detach().numpy() for part in LAW(*inputs))
     e = errors[0] - np.clip(errors[0], -N["deadband"], N["deadband"])
     u = N["kp"] * e - N["kd"] * v + drive
     line = np.clip(1.0 - np.abs(v) / N["no_load_speed"], 0.0, 1.0)  # where the motor drives; braking has its limit
     high, low = N["limit"] * np.where(v > 0, line, 1.0), -N["limit"] * np.where(v < 0, line, 1.0)
-    return np.clip(u, low, high) - N["viscous"] * v - N["coulomb"] * dahl / {bristle:g} + output
+    return np.clip(u, low, high) - N["viscous"] * v - N["coulomb"] * dahl / N["bristle"] + output
 '''
 HELD = ("kp", "kd", "limit", "no_load_speed", "coulomb", "viscous", "deadband", "offset", "delay", "armature", "law")
 UNREACHED = 1e9  # a limit that there is none of, in a JSON file
@@ -57,17 +57,16 @@ def export_servo(simulator: Simulator) -> Export:
         raise ConfigError("world.servo", "is missing; format=servo is for a world with a learned servo")
     name, module = simulator.name, law_module(plant)
     joints = {key: by_joint(plant, np.clip(getattr(plant.servo, key), -UNREACHED, UNREACHED)) for key in numbers()}
+    joints["bristle"] = by_joint(plant, BRISTLE * plant.robot.sizes)
     about = {
         "robot": plant.robot.name,
+        "order": list(plant.robot.motors),
         "inputs": {"errors": f"(1, n, {LAGS}) [rad]", "velocity": "(1, n) [rad/s]", "bristle": "(1, n) [rad]"},
         "outputs": {"drive": "before the torque limit (1, n) [N·m]", "output": "behind it (1, n) [N·m]"},
         "lag": LAG,
-        "bristle": BRISTLE,
         "joints": joints,
     }
-    reference = _REFERENCE.format(
-        robot=plant.robot.name, name=name, lag=LAG, last=LAG * (LAGS - 1), lags=LAGS, bristle=BRISTLE
-    )
+    reference = _REFERENCE.format(robot=plant.robot.name, name=name, lag=LAG, last=LAG * (LAGS - 1), lags=LAGS)
     files: dict[str, str | bytes] = {
         f"{name}_servo.pt": _torchscript(module),
         f"{name}_servo.json": pretty(about),
@@ -90,12 +89,13 @@ def law_module(plant: Plant) -> Any:
     group = np.maximum(law.group, 0)
     acts = (law.group != NOBODY).astype(float)
     one_of = {key: torch.tensor(getattr(law, key)[group], dtype=torch.float32) for key in law._fields[4:]}
-    each = {"stiffness": law.stiffness, "torque": law.torque * acts, "lag": law.lag}
+    each = {"stiffness": law.stiffness, "torque": law.torque * acts, "lag": law.lag, "size": plant.robot.sizes}
 
     class Law(torch.nn.Module):
         stiffness: torch.Tensor
         torque: torch.Tensor
         lag: torch.Tensor
+        size: torch.Tensor
         first: torch.Tensor
         first_bias: torch.Tensor
         second: torch.Tensor
@@ -116,7 +116,8 @@ def law_module(plant: Plant) -> Any:
             self, errors: torch.Tensor, velocity: torch.Tensor, bristle: torch.Tensor
         ) -> tuple[torch.Tensor, torch.Tensor]:
             lagged = errors * self.stiffness[:, None]
-            others = [velocity / SPEED_UNIT, self.act(SIGN * velocity), bristle / BRISTLE]
+            speed, bent = velocity / self.size, bristle / self.size
+            others = [speed / SPEED_UNIT, self.act(SIGN * speed), bent / BRISTLE]
             x = torch.cat([lagged, torch.stack(others, dim=-1)], dim=-1)[..., None, :]
             x = self.act(torch.matmul(x, self.first) + self.first_bias[:, None])
             x = self.act(torch.matmul(x, self.second) + self.second_bias[:, None])

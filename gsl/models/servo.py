@@ -9,14 +9,16 @@ from typing import Any, ClassVar
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.core.servo import Servo
+from gsl.core.servo import Servo, numbers
 from gsl.core.servo_law import HIDDEN, INPUTS, LAGS, NOBODY, ServoLaw
+from gsl.core.slides import levers, power
 from gsl.errors import ConfigError
 
 FACTORS = ("kp", "kd", "limit")  # numbers that are multiplied
 SUMS = ("delay", "coulomb", "viscous", "deadband", "armature", "offset")  # and those that are added to
 LOSSES = ("load_friction", "duty_loss")  # and so are these, in replays alone: gradients leave them as they are
 NUMBERS = (*FACTORS, *SUMS, *LOSSES)
+SLIDES = "slides"  # group of the motors that slide, where others turn
 UNLIMITED = 1e9  # in a checkpoint, which holds finite numbers alone
 LEAST_INERTIA = 0.2  # share of the rotor's inertia that is left: below it the joint is not stable at 2 ms
 
@@ -104,6 +106,17 @@ class ServoModel:
             about["robot"], joints, groups, numbers, arrays["group"], arrays["lag"], network, arrays["noise"], base
         )
 
+    def in_metres(self, plant: Plant, base: Plant) -> ServoModel:
+        """Return a model that was learned with slides in angles for the same robot with slides in metres.
+
+        Args:
+            plant: On which it was learned, in angles.
+            base: The same in metres.
+        """
+        way, units = levers(plant.robot), numbers()
+        own = {name: self.numbers[name] * way ** -power(units[name].unit) for name in SUMS}
+        return replace(self, numbers={**self.numbers, **own}, noise=self.noise / way[:, None], base=base_servo(base))
+
     def shift(self, plant: Plant, change: np.ndarray) -> ServoModel:
         """Return the model with numbers changed, in `units`, shape (NUMBERS, n_joints); coupled motors follow."""
         each = change[:, plant.robot.drive] * np.array([units(plant)[name] for name in NUMBERS])
@@ -140,10 +153,11 @@ def shapes(groups: int) -> dict[str, tuple[int, ...]]:
 def neutral(plant: Plant, rng: np.random.Generator) -> ServoModel:
     """Return a learned servo that changes nothing, its hidden layers drawn at random.
 
-    A motor of several groups is of the smallest one: a leg's knee belongs to the knees.
+    A motor of several groups is of the smallest one: a leg's knee belongs to the knees. Slides are like no hinge.
     """
     robot, n = plant.robot, len(plant.robot.motors)
-    member = {motor: "others" if robot.groups else "all" for motor in robot.motors}
+    rest = "others" if robot.groups or 0 < len(robot.slides) < n else "all"
+    member = {motor: SLIDES if motor in robot.slides and rest != "all" else rest for motor in robot.motors}
     for name in sorted(robot.groups, key=lambda name: -len(robot.groups[name])):
         member |= {motor: name for motor in robot.motors if motor in robot.groups[name]}
     names = tuple(dict.fromkeys(member[motor] for motor in robot.motors))

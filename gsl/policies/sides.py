@@ -29,7 +29,7 @@ def pairs(robot: Robot) -> tuple[Pair, ...]:
     frames = forward_kinematics(lump(robot), {})
     joints = [robot.joint(name) for name in robot.controlled]
     places = np.array([frames.origin[joint.child] for joint in joints])
-    axes = np.array([frames.axis[joint.name] for joint in joints])
+    axes = np.array([frames.axis[joint.name] / joint.lever for joint in joints])
     slides = np.array([joint.slides for joint in joints])
     mirrored = np.where(slides[:, None], _MIRROR, -_MIRROR) * axes
     along = np.where(slides[:, None] == slides, axes @ mirrored.T, 0.0)

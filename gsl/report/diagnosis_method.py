@@ -24,6 +24,7 @@ def caveats(document: Document) -> Markup | None:
 
 def calibration(document: Document) -> Markup | None:
     """Return every joint's own small deviations."""
+    slides = document.get("slides") or []
     rows = [
         (
             read_word(row, "joint"),
@@ -31,15 +32,17 @@ def calibration(document: Document) -> Markup | None:
             _scale(row.get("kd"), 1.0, decimals=3),
             _scale(row.get("coulomb"), 1.0, decimals=4),
             _scale(row.get("viscous"), 1.0, decimals=4),
-            _scale(row.get("zero"), 180.0 / math.pi, decimals=2),
+            _scale(row.get("zero"), 1000.0 if read_word(row, "joint") in slides else 180.0 / math.pi, decimals=2),
             _scale(row.get("inertia"), 1000.0, decimals=2),
         )
         for row in entries(document, "calibration")
     ]
     columns = (
-        *("joint", "kp, factor", "kd, factor", "Coulomb friction, added [N·m]", "viscous friction, added [N·m·s/rad]"),
-        "zero of the log [°]",
-        "inertia, added [g·m²]",
+        *("joint", "kp, factor", "kd, factor"),
+        f"Coulomb friction, added [N·m]{', [N]' * bool(slides)}",
+        f"viscous friction, added [N·m·s/rad]{', [N·s/m]' * bool(slides)}",
+        f"zero of the log [°]{', [mm]' * bool(slides)}",
+        f"inertia, added [g·m²]{', [g]' * bool(slides)}",
     )
     note = (
         "What each joint differs by besides, refitted for every explanation, so that none hides in it. Where robot and "
@@ -50,17 +53,22 @@ def calibration(document: Document) -> Markup | None:
 
 def noise_floor(document: Document) -> Markup | None:
     """Return the noise of each joint's log."""
-    floor = part(document, "floor")
+    floor, slides = part(document, "floor"), document.get("slides") or []
     rows = [
-        (str(joint), _scale(sd, 1000.0, decimals=2), _scale(sd, 180.0 / math.pi, decimals=3))
+        (
+            str(joint),
+            _scale(sd, 1000.0, decimals=2),
+            NONE if joint in slides else _scale(sd, 180.0 / math.pi, decimals=3),
+        )
         for joint, sd in part(floor, "sd").items()
     ]
+    thousandths = f"sd [mrad]{', [mm]' * bool(slides)}"
     pairs = floor.get("pairs")
     if floor.get("source") == "repeats":
         note = f"Measured: {pairs or 'some'} repeats of the same commands, and how far their logs differ."
     else:
         note = "Estimated from the roughness of the log: no motion was repeated. Repeats would make it sure."
-    return section("Noise floor", table(("joint", "sd [mrad]", "sd [°]"), rows) if rows else None, note=note)
+    return section("Noise floor", table(("joint", thousandths, "sd [°]"), rows) if rows else None, note=note)
 
 
 def _scale(value: object, factor: float, *, decimals: int) -> str:

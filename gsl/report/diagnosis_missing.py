@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 
 from markupsafe import Markup
 
+from gsl.core.slides import unit_of_slide
 from gsl.report.charts import Curve, line_chart
 from gsl.report.diagnosis_words import Document, entries, finite, list_words, name, part, read_word, share
 from gsl.report.parts import element, prose, section, table
@@ -56,9 +57,14 @@ def _milliseconds(late: float) -> str:
     return f"{abs(1e3 * late):.0f} ms {'late' if late >= 0.0 else 'early'}"
 
 
+def _axis(form: Document, slides: Collection[str]) -> str:
+    words = _AXES.get(read_word(form, "form"), name(read_word(form, "form")))
+    return unit_of_slide(words) if read_word(form, "joint") in slides else words
+
+
 def missing(document: Document) -> Markup | None:
     """Return what a law of each servo says of a gap that no effect explains."""
-    forms = entries(document, "forms")
+    forms, slides = entries(document, "forms"), document.get("slides") or []
     kinds = [kind for kind in WORDS if kind != "gain" and any(kind in part(form, "shares") for form in forms)]
     rows = [
         (
@@ -71,8 +77,8 @@ def missing(document: Document) -> Markup | None:
     drawn = [
         line_chart(
             [Curve(read_word(form, "joint"), "after", form.get("x") or [], form.get("y") or [])],
-            x=_AXES.get(read_word(form, "form"), name(read_word(form, "form"))),
-            y="missing torque [N·m]",
+            x=_axis(form, slides),
+            y="missing force [N]" if read_word(form, "joint") in slides else "missing torque [N·m]",
         )
         for form in forms
     ]

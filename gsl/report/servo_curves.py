@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gsl.core.plant import Plant
+from gsl.core.slides import in_angles, levers
 from gsl.models.servo import ServoModel
+from gsl.report.shown import scale_of
 from gsl.report.style import GROUNDED, SIMULATION, WIDTH, figure, headline, look, save
 from gsl.worlds.held import Held
 
@@ -60,22 +62,26 @@ def servo_curves_figure(
         title: What there is to see.
         width: Of the figure [in].
     """
-    plants = (("simulator", plant, SIMULATION), ("learned servo", model.on(plant), GROUNDED))
+    plants = (("simulator", in_angles(plant), SIMULATION), ("learned servo", in_angles(model.on(plant)), GROUNDED))
+    ways = levers(plants[0][1].robot)
     with look():
         whole = figure(5.2, width)
-        axes = whole.subplots(2, len(groups), squeeze=False)
+        axes, shown = whole.subplots(2, len(groups), squeeze=False), ""
         for column, g in enumerate(groups):
             joint = int(np.argmax(_members(model, plant) == g))
+            way, scale, slides = ways[joint], scale_of(model.joints[joint], plant.robot.slides), ways[joint] != 1.0
             for label, drives, colour in plants:
                 time, answer = step_response(drives, joint, step, period)
-                axes[0, column].plot(time, np.degrees(answer), color=colour, label=label, linewidth=1.8)
+                axes[0, column].plot(time, scale.factor * way * answer, color=colour, label=label, linewidth=1.8)
                 speed, torque = motion_cost(drives, joint, step, period)
-                axes[1, column].plot(speed, torque, color=colour, label=label, linewidth=1.8)
+                axes[1, column].plot(way * speed, torque / way, color=colour, label=label, linewidth=1.8)
             axes[0, column].set_title(f"{model.groups[g]}: {model.joints[joint]}", loc="left")
             axes[0, column].set_xlabel("time after a step [s]")
-            axes[1, column].set_xlabel("speed [rad/s]")
-        axes[0, 0].set_ylabel("answer [°]")
-        axes[1, 0].set_ylabel("torque at that speed [N·m]")
+            axes[1, column].set_xlabel(f"speed [{'m/s' if slides else 'rad/s'}]")
+            if scale.unit != shown:
+                shown = scale.unit
+                axes[0, column].set_ylabel(f"answer [{shown}]")
+                axes[1, column].set_ylabel("force at that speed [N]" if slides else "torque at that speed [N·m]")
         axes[0, 0].legend(frameon=False)
         headline(whole, title)
     return whole

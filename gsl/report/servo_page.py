@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from markupsafe import Markup
 
 from gsl.core.plant import Plant
+from gsl.core.slides import unit_of_slide
 from gsl.models.servo import FACTORS, NUMBERS, ServoModel
 from gsl.report.account import servo_table
 from gsl.report.charts import Curve, line_chart
@@ -73,7 +74,7 @@ def write_servo_page(
             bullets([prose(f"{line[:1].upper()}{line[1:]}.") for line in problems]),
         ),
         section("What the servo has learned", choice("joints", pictures), note=_CURVES),
-        section("Numbers that it has learned", _numbers(model), note=_CHANGES),
+        section("Numbers that it has learned", _numbers(model, plant.robot.slides), note=_CHANGES),
         section("Training", _training(way), note=_TRAINING),
         budget(spent),
     ]
@@ -86,19 +87,29 @@ _CHANGES = "A factor (×) is on the simulator's own value, any other number is a
 _TRAINING = "Half of the held-out motions say when to stop. The figures above are of the other half."
 
 
-def _numbers(model: ServoModel) -> Markup | None:
+def _numbers(model: ServoModel, slides: Collection[str]) -> Markup | None:
     """Return the numbers of each motor that has learned some; only numbers that changed anywhere have a column."""
     changed = [name for name in NUMBERS if model.numbers[name].any()]
     if not changed:
         return None
-    rows = [[joint, *(_say(name, model.numbers[name][k]) for name in changed)] for k, joint in enumerate(model.joints)]
-    return table(["joint", *(_NUMBERS[name][0] for name in changed)], rows)
+    rows = [
+        [joint, *(_say(name, model.numbers[name][k], slides=joint in slides) for name in changed)]
+        for k, joint in enumerate(model.joints)
+    ]
+    return table(["joint", *(_title(name, slides=bool(slides)) for name in changed)], rows)
 
 
-def _say(name: str, value: float) -> str:
+def _title(name: str, *, slides: bool) -> str:
+    unit = _NUMBERS[name][0].partition("[")[2].rstrip("]")
+    own = unit_of_slide(unit.replace("°", "mm"))
+    return f"{_NUMBERS[name][0]}, [{own}]" if slides and own != unit else _NUMBERS[name][0]
+
+
+def _say(name: str, value: float, *, slides: bool) -> str:
     if name in FACTORS:
         return f"× {np.exp(value):.2f}"
-    return f"{_NUMBERS[name][1] * value:+.3g}".replace("-", "−")
+    factor = _NUMBERS[name][1]
+    return f"{(1e3 if slides and factor == _DEGREES else factor) * value:+.3g}".replace("-", "−")
 
 
 def _training(way: Sequence[float]) -> Markup | None:

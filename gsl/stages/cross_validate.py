@@ -17,6 +17,7 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.transitions import usable
 from gsl.core.workload import Part
+from gsl.diagnosis.angles import effects_in_metres, with_log_in_angles
 from gsl.diagnosis.diagnose import diagnose, prepare
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
@@ -97,6 +98,8 @@ class CrossValidate:
     def __post_init__(self) -> None:
         """Refuse what cannot be fitted to all joints, or is to be left out, or replayed."""
         check_replayable(self.sim.motors, self.sim.plant)
+        if self.gat is not None and (slides := self.sim.plant.robot.slides):
+            raise ConfigError("gat", f"learns angles alone, and {', '.join(slides)} slide; gat=null leaves it out")
         if not self.usual:
             raise ConfigError("usual", "names at least one effect to compare with")
         everywhere = {candidate.effect for candidate in library(lump(self.sim.plant.robot)) if candidate.on_joints}
@@ -169,9 +172,10 @@ class CrossValidate:
             self.without, self.most, self.duels, self.nulls, threads(self.workers), share_clock(log, self.clocks),
             seed=self.seed, tolerance=self.tolerance, held_out={self.by: inner} if inner else {},
         )  # fmt: skip
-        plant, robot = self.sim.plant, lump(self.sim.plant.robot)
+        log, plant = with_log_in_angles(log, self.sim.plant)
         findings = diagnose(self._rest(log, values), plant, self.sim.step, options, PhaseReporter(console))
-        exp, chosen = prepare(log, robot, replace(options, held_out={self.by: values})), findings.selection.chosen
+        exp = prepare(log, lump(plant.robot), replace(options, held_out={self.by: values}))
+        chosen = findings.selection.chosen
         before = findings.simulator.simulate({}, no_shifts(len(exp.joints)), exp.pieces)
         after = findings.simulator.simulate(chosen.effects, chosen.fit.shifts, exp.pieces)
         causes = [chosen.names[cause.index] for cause in findings.verdict.causes]
@@ -183,7 +187,7 @@ class CrossValidate:
             values=values,
             verdict=findings.verdict.word,
             causes=causes,
-            parameters=chosen.effects,
+            parameters=effects_in_metres(chosen.effects, findings.log.robot),
             removed=compute_removed(exp, exp.residual(before), exp.residual(after))[0],
             ceiling=ceiling(exp, before, learn_laws(exp, findings.simulator, chosen.effects, chosen.fit.shifts)),
             names=[record.name for record in _check(exp)],

@@ -36,7 +36,7 @@ from gsl.storage.hashing import PAGE
 from gsl.validation.policy_gap import Effort, policy_gap
 from gsl.validation.real_returns import RealReturns, list_parents, real_returns
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.fits import check_replayable
+from gsl.worlds.fits import check_hinges, check_replayable
 
 DEFAULT_ROBOT = "nao"  # that commands mean which name none
 
@@ -115,6 +115,8 @@ class Diagnose:
     def _read(self, role: str) -> Batch:
         batch = read_logs(getattr(self, role))
         check_log(batch, lump(self.sim.plant.robot), getattr(self, role))
+        if on_ground(batch):
+            check_hinges(self.sim.plant.robot, getattr(self, role))
         return batch
 
     def _stranger(self, batch: Batch) -> str | None:

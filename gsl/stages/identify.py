@@ -10,12 +10,12 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import yaml
 
-from gsl.core.body import lump
 from gsl.core.console import Console
 from gsl.core.described import describe
 from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
-from gsl.diagnosis.log.files import log_parents, read_motions
+from gsl.diagnosis.angles import effects_in_metres
+from gsl.diagnosis.log.files import log_parents, read_logs, take_motions
 from gsl.diagnosis.log.gains import unseen_gains, with_logged_gains
 from gsl.diagnosis.options import Options, Without
 from gsl.diagnosis.search.reference import Nominal
@@ -59,18 +59,20 @@ class Identify:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write report.json and the identified world."""
-        log = read_motions(self.real, lump(self.sim.plant.robot))
-        sim = with_logged_gains(self.sim, [record.sensors for record in log.records], self.real)
+        batch = read_logs(self.real)
+        log, plant = take_motions(batch, self.sim.plant, self.real)
+        sensors = [episode.sensors for episode in batch.episodes]
+        sim = with_logged_gains(self.sim, sensors, self.real)
         if sim is not self.sim:
             return replace(self, sim=sim).run(folder, console)
-        if warning := unseen_gains([record.sensors for record in log.records], log.joints):
+        if warning := unseen_gains(sensors, log.joints):
             console.status(f"warning: {warning}")
         options = Options(self.without, threads=threads(self.workers))
-        problem = Nominal(self.sim.plant, self.sim.step).problem(log, options, lambda phase: checkpoint())
+        problem = Nominal(plant, self.sim.step).problem(log, options, lambda phase: checkpoint())
         with console.progress(self.evaluations, "fitting all parameters at once") as progress:
             system = identify(problem, evaluations=self.evaluations, seed=self.seed, tick=progress.advance)
         before, after = (_gap(problem.held_out, effects) for effects in ({}, system.effects))
-        effects = join_effects(system.effects)
+        effects = join_effects(effects_in_metres(system.effects, log.robot))
         fit = f"{len(system.candidates)} parameters of {len(effects)} effects were fitted at once"
         summary = f"{fit}: held out, {before:.1f} noise floors became {after:.1f}."
         report = {

@@ -10,11 +10,11 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 import yaml
 
-from gsl.core.body import lump
 from gsl.core.console import Console
 from gsl.core.described import describe
+from gsl.core.plant import Plant
 from gsl.core.setting import component, setting
-from gsl.diagnosis.log.files import check_log, log_parents, on_ground, read_logs, read_motions
+from gsl.diagnosis.log.files import check_log, log_parents, on_ground, read_logs, take_motions
 from gsl.diagnosis.log.gains import unseen_gains, with_logged_gains
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Tolerance
@@ -33,7 +33,7 @@ from gsl.training.servo_verdict import problems, remarks
 from gsl.training.servo_walks import Walks, walks
 from gsl.training.torque_width import measure_widths
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.fits import check_replayable, fitting_step
+from gsl.worlds.fits import check_hinges, check_replayable, fitting_step
 
 WORLD, CURVES = "world/learned.yaml", "servo.png"
 
@@ -72,11 +72,13 @@ class TrainServo:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the checkpoint, the world that it makes and what it has learned as curves."""
-        exp = read_motions(self.real, lump(self.sim.plant.robot), self.held_out)
-        sim = with_logged_gains(self.sim, [record.sensors for record in exp.records], self.real)
+        batch = read_logs(self.real)
+        exp, plant = take_motions(batch, self.sim.plant, self.real, self.held_out)
+        sensors = [episode.sensors for episode in batch.episodes]
+        sim = with_logged_gains(self.sim, sensors, self.real)
         if sim is not self.sim:
             return replace(self, sim=sim).run(folder, console)
-        if warning := unseen_gains([record.sensors for record in exp.records], exp.joints):
+        if warning := unseen_gains(sensors, exp.joints):
             console.status(f"warning: {warning}")
         if len(exp.held_out) < 2:
             raise InputError(f"{self.real}: one window is held out; a servo needs two, to stop by and to check by")
@@ -84,20 +86,23 @@ class TrainServo:
         walked = self._walks(exp)
         console.phase(f"learning the servo from {len(exp.records)} motions; a minute for a humanoid")
         learned = learn_servo(
-            exp, self.sim.plant, self.sim.step, labelled=bool(self.held_out), seed=self.seed,
+            exp, plant, self.sim.step, labelled=bool(self.held_out), seed=self.seed,
             threads=threads(self.workers), members=self.members, walks=walked,
         )  # fmt: skip
         console.phase("measuring what the servo leaves unexplained")
-        model = replace(learned.model, noise=self._measure_unexplained(exp, learned.model))
-        further = [replace(servo.model, noise=model.noise) for servo in learned.further]
+        noise = self._measure_unexplained(exp, learned.model, plant)
+        model, *further = (
+            replace(servo, noise=noise).in_metres(plant, self.sim.plant)
+            for servo in (learned.model, *(member.model for member in learned.further))
+        )
         write_model(folder, ServoMembers((model, *further)))
         self._write_world(folder, learned)
         servo_curves(folder / CURVES, self.sim.plant, model, fitting_step(self.sim.step, exp.period), exp.period)
         metrics = document(learned) | {"step": fitting_step(self.sim.step, exp.period)}
         for line in remarks(metrics):
             console.status(f"warning: {line}")
-        noise = dict(zip(model.joints, model.noise.tolist(), strict=True))
-        metrics |= {"torque_noise": noise, "problems": problems(metrics)}
+        noises = dict(zip(model.joints, model.noise.tolist(), strict=True))
+        metrics |= {"torque_noise": noises, "problems": problems(metrics)}
         way = [progress.level for progress in learned.way]
         write_servo_page(folder, metrics, model, self.sim.plant, exp.period, way, spent=_count_real(exp, learned))
         return metrics
@@ -114,16 +119,17 @@ class TrainServo:
         check_log(batch, exp.robot, self.walks)
         if not on_ground(batch):
             raise InputError(f"{self.walks}: the robot is in the air here; name these logs in real=")
+        check_hinges(exp.robot, self.walks)
         if abs(batch.control_period - exp.period) > 1e-9:
             rates = f"{batch.control_period:g} s, not {exp.period:g} s as in {self.real}"
             raise InputError(f"{self.walks}: has another control period, {rates}; resample one of them")
         return walks(batch, exp.robot, self.sim.plant, self.sim.step, threads(self.workers))
 
-    def _measure_unexplained(self, exp: Log, model: ServoModel) -> np.ndarray:
+    def _measure_unexplained(self, exp: Log, model: ServoModel, plant: Plant) -> np.ndarray:
         """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (n, 2)."""
-        group = neutral(self.sim.plant, np.random.default_rng(0)).group  # of those that keep their servo, too
+        group = neutral(plant, np.random.default_rng(0)).group  # of those that keep their servo, too
         groups = {name: group[: len(exp.joints)] == g for g, name in enumerate(model.groups)}
-        widths = measure_widths(exp, model.on(self.sim.plant), step=self.sim.step, seed=self.seed, groups=groups)
+        widths = measure_widths(exp, model.on(plant), step=self.sim.step, seed=self.seed, groups=groups)
         return np.array([widths[name] for name in model.groups])[group]
 
     def _write_world(self, folder: Path, learned: LearnedServo) -> None:

@@ -62,7 +62,7 @@ class Engine:
         self.body = NOTHING
         self.plant, self.physics, self.robot = plant, physics, lump(plant.robot)
         self.handle = client_handle(pybullet.__file__, self.client)
-        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law, hardness(plant.robot))
+        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law, hardness(plant.robot), plant.robot.sizes)
         apart, moved = servo.rows[ROTOR], physics.motors == "servo"
         armature = plant.servo.armature - apart if moved else np.zeros(len(apart))
         self._motors = None if moved else VelocityMotors.of(plant, servo.rows)

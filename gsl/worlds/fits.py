@@ -6,7 +6,7 @@ import numpy as np
 
 from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, InputError
 from gsl.worlds.encoder import REMEMBERED
 from gsl.worlds.held import refuse_hook
 from gsl.worlds.servo_state import COMMANDS
@@ -58,30 +58,21 @@ def check_replayable(motors: Motors, plant: Plant) -> None:
         plant: Of the simulator.
 
     Raises:
-        ConfigError: Its joints are turned by velocity motors, some of them slide, or it has a torque hook.
+        ConfigError: Its joints are turned by velocity motors, or it has a torque hook.
     """
     check_servos(motors)
-    check_turning(plant.robot)
     refuse_hook(plant)
 
 
-def check_turning(robot: Robot, setting: str = "sim.robot") -> None:
-    """Refuse a robot whose motors slide, where logs are compared in radians: its statistics are those of hinges.
-
-    Args:
-        robot: Of the simulator.
-        setting: That the user would have to change.
+def check_hinges(robot: Robot, log: str) -> None:
+    """Refuse a log of a robot on the ground whose joints slide: Bullet replays it, in metres.
 
     Raises:
-        ConfigError: Some of them do.
+        InputError: Some of them do.
     """
     if robot.slides:
-        turning = ",".join(name for name in robot.controlled if name not in robot.slides)
-        problem = f"logs are compared in radians, and {', '.join(robot.slides)} slide"
-        advice = (
-            f"hold them by a robot file: gsl init ... joints=[{turning}]" if turning else "no joint is left to look at"
-        )
-        raise ConfigError(setting, f"{problem}; {advice}")
+        problem = f"on the ground no log of joints that slide is compared, and {', '.join(robot.slides)} slide"
+        raise InputError(f"{log}: {problem}; log the robot in the air")
 
 
 def check_base(robot: Robot, *, floating: bool) -> None:

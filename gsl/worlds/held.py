@@ -94,7 +94,7 @@ class Held:
             ConfigError: It has a torque hook, which only Bullet calls.
         """
         refuse_hook(plant)
-        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law, hardness(plant.robot))
+        servo = pack(plant.servo, plant.robot.supply_voltage, plant.law, hardness(plant.robot), plant.robot.sizes)
         pushes = [row for push in plant.pushes for row in _aim(push, plant.robot)]
         tree = chain(plant, plant.servo.armature - servo.rows[ROTOR])
         return cls(servo, tree, np.array(pushes).reshape(-1, 9), plant.sensors.bias, step, period, accurate)

@@ -46,6 +46,7 @@ from gsl.worlds.servo_state import (
     ROTOR_ANGLE,
     ROTOR_SPEED,
     SAG,
+    SIZE,
     SMOOTHED,
     SPEED,
     STIFFNESS,
@@ -55,7 +56,8 @@ from gsl.worlds.servo_state import (
     ServoState,
 )
 
-BRISTLE = 1e-3  # deflection at which dry friction slips [rad]: below an encoder's noise, stable at 2 ms with our rotors
+# Deflection at which dry friction slips [rad], or `Joint.size`s: below an encoder's noise, stable at 2 ms with ours.
+BRISTLE = 1e-3
 BESIDE = 3  # columns a motor before the shares of its gains: target, desired speed, feed-forward torque
 
 
@@ -163,6 +165,7 @@ def _evaluate_law(
     parameters: np.ndarray, weights: np.ndarray, memory: np.ndarray, i: int, v: float, step: float, layers: np.ndarray
 ) -> tuple[float, float]:
     """Return what motor i's law adds before the torque limit and behind it [N·m], errors being in `layers` already."""
+    v = v / parameters[SIZE, i]
     memory[LAW_BENT, i] = min(BRISTLE, max(-BRISTLE, memory[LAW_BENT, i] + v * step))
     layers[0, LAGS] = v / SPEED_UNIT
     layers[0, LAGS + 1] = act(SIGN * v)
@@ -291,6 +294,7 @@ def _dry(parameters: np.ndarray, memory: np.ndarray, i: int, v: float, through: 
         inertial = parameters[OUTPUT_ARMATURE, i] * (v - memory[SPEED, i]) / step
         external = inertial - memory[THROUGH, i] + memory[FRICTION, i]
         size += load * abs(through - external)
-    bent, free = min(BRISTLE, max(-BRISTLE, memory[BENT, i] + v * step)), size == 0.0
+    slips, free = BRISTLE * parameters[SIZE, i], size == 0.0
+    bent = min(slips, max(-slips, memory[BENT, i] + v * step))
     memory[BENT, i] = where(free, memory[BENT, i], bent)
-    return where(free, 0.0, size * bent / BRISTLE)
+    return where(free, 0.0, size * bent / slips)

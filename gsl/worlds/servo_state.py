@@ -14,7 +14,9 @@ from gsl.worlds.encoder import REMEMBERED, fill_history
 
 COMMANDS = 16  # control periods of targets that are remembered: the longest delay
 
-(OUTPUT_ARMATURE, ROTOR, SAG, PER_AMPERE, HARDNESS, GROUP, STIFFNESS, TORQUE, LAG_SHARE) = range(len(ROW), len(ROW) + 9)
+(OUTPUT_ARMATURE, ROTOR, SAG, PER_AMPERE, HARDNESS, SIZE, GROUP, STIFFNESS, TORQUE, LAG_SHARE) = range(
+    len(ROW), len(ROW) + 10
+)
 """Rows of the parameters that follow from the servo's numbers, whose own rows are `ROW`, and from a learned law."""
 MEMORY = 9  # rows of the state
 BENT, ROTOR_ANGLE, ROTOR_SPEED, SMOOTHED, SPEED, DRIVE, THROUGH, FRICTION, LAW_BENT = range(MEMORY)
@@ -58,7 +60,11 @@ class ServoState(NamedTuple):
 
 
 def pack(
-    servo: Servo, supply_voltage: float, law: ServoLaw | None = None, hardness: np.ndarray | float = 1.0
+    servo: Servo,
+    supply_voltage: float,
+    law: ServoLaw | None = None,
+    hardness: np.ndarray | float = 1.0,
+    sizes: np.ndarray | float = 1.0,
 ) -> ServoParameters:
     """Return the parameters as the kernel reads them.
 
@@ -67,13 +73,15 @@ def pack(
         supply_voltage: Of the common supply without load [V].
         law: What they do beyond their parameters.
         hardness: Of stops and teeth, see `plant.hardness`, shape (n_motors,).
+        sizes: What counts as much as a radian of a hinge, see `Joint.size`, shape (n_motors,).
     """
     law = no_law(len(servo.kp)) if law is None else law
     two_masses = (servo.play > 0.0) | (servo.compliance >= STIFFEST / hardness)
     rotor = np.where(two_masses, ROTOR_SHARE * servo.armature, 0.0)
     derived = (
         servo.armature - rotor, rotor, servo.supply_resistance / supply_voltage, 1.0 / servo.torque_constant,
-        hardness + np.zeros(len(servo.kp)), law.group, law.stiffness, law.torque, *law.lag.T,
+        hardness + np.zeros(len(servo.kp)), sizes + np.zeros(len(servo.kp)), law.group, law.stiffness, law.torque,
+        *law.lag.T,
     )  # fmt: skip
     return ServoParameters(np.array([*servo, *derived]), weights(law))
 

@@ -113,8 +113,8 @@ def test_a_cause_whose_interval_holds_what_does_nothing_is_none(
 ) -> None:
     cause = claim(effect, values, free)
     cause = replace(cause, fit=replace(cause.fit, covariance=np.diag(np.full(len(values), sd**2))))
-    assert (effect in find_idle(cause, 1.0)) == idle
-    assert all(reason.endswith("which does nothing") for reason in find_idle(cause, 1.0).values())
+    assert (effect in find_idle(cause, 1.0, arm())) == idle
+    assert all(reason.endswith("which does nothing") for reason in find_idle(cause, 1.0, arm()).values())
 
 
 def test_an_interval_holds_what_the_self_test_was_off_by_and_stays_off_doing_nothing() -> None:

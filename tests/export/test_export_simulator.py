@@ -22,7 +22,7 @@ from gsl.errors import ConfigError
 from gsl.export.bam import export_bam
 from gsl.export.isaac import export_isaac
 from gsl.export.mjcf import export_mjcf
-from gsl.export.parts import Export, Simulator
+from gsl.export.parts import Export, Simulator, unheld
 from gsl.export.plain_json import export_json
 from gsl.export.servo_network import export_servo, law_module
 from gsl.export.urdf_dynamics import export_urdf
@@ -231,10 +231,14 @@ def test_the_learned_servo_says_the_same_as_torchscript_and_onnx(tmp_path: Path)
     np.testing.assert_allclose(answer, wanted, atol=1e-5 * np.abs(plant.servo.limit).max())
 
 
+@pytest.mark.parametrize("slides", [False, True])
 def test_the_reference_of_a_learned_servo_is_short_and_gives_the_kernels_torque(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, slides: bool
 ) -> None:
-    plant = apply_all(nominal(robot("so101")), build({"coulomb_friction": {"torque": 0.05}}))
+    body = robot("so101")
+    body = replace(body, joints=tuple(replace(joint, slides=slides and joint.lower < -1.7) for joint in body.joints))
+    assert (0 < len(body.slides) < len(body.motors)) == slides
+    plant = apply_all(nominal(body), build({"coulomb_friction": {"torque": 0.05}}))
     plant = replace(plant, law=some_law(plant))
     for name, data in export_servo(Simulator(plant, STEP, PERIOD, False, "arm")).files.items():
         (tmp_path / name).write_bytes(data if isinstance(data, bytes) else data.encode())
@@ -244,13 +248,22 @@ def test_the_reference_of_a_learned_servo_is_short_and_gives_the_kernels_torque(
     torque = runpy.run_path("arm_servo_reference.py")["torque"]
     n, rng = len(plant.robot.motors), np.random.default_rng(2)
     target, q, v = (0.1 * rng.standard_normal(n) for _ in range(3))
-    servos = pack(plant.servo, plant.robot.supply_voltage, plant.law)
+    servos = pack(plant.servo, plant.robot.supply_voltage, plant.law, sizes=plant.robot.sizes)
     motion = np.array([q, v])
     state = first_state(target[None], motion, STEP)
     wanted = np.zeros(n)
     servo_torque(servos, state, motion, 0.0, STEP, PERIOD, wanted)
     answer = torque(np.tile(target, (LAGS, 1)), q, v, np.zeros(n), np.zeros(n), STEP)
     np.testing.assert_allclose(answer, wanted, atol=1e-5)
+
+
+def test_what_no_format_holds_of_a_slide_is_in_metres_and_newtons() -> None:
+    body = robot("so101")
+    body = replace(body, joints=tuple(replace(joint, slides=True) for joint in body.joints))
+    sliding = Simulator(nominal(body), STEP, PERIOD, False, "arm")
+    assert any(" N/m at " in line for line in unheld(sliding.plant, ()))
+    document = json.loads(str(next(iter(export_json(sliding).files.values()))))
+    assert document["slides"] == list(body.motors) and document["servo"]["kp"]["unit_of_slides"] == "N/m"
 
 
 def test_a_world_without_a_learned_servo_has_none_to_export() -> None:

@@ -25,7 +25,7 @@ from gsl.robots.frames import euler
 from gsl.robots.urdf import urdf
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.drive_train import STOP_STIFFNESS
-from gsl.worlds.fits import check_turning
+from gsl.worlds.fits import check_hinges
 from gsl.worlds.held import Held
 
 pytestmark = pytest.mark.slow
@@ -231,13 +231,11 @@ def test_people_read_millimetres() -> None:
     assert scale_of("reach", ("reach",)) == (1000.0, "mm") and scale_of("swing", ("reach",)).unit == "°"
 
 
-def test_logs_of_it_are_not_diagnosed(made: Callable[..., Path]) -> None:
-    with pytest.raises(ConfigError) as error:
-        check_turning(robot(str(made(GANTRY))))
-    line = (
-        "sim.robot: logs are compared in radians, and way, reach, grip slide; hold them by a robot file: gsl init ... "
-    )
-    assert str(error.value) == f"{line}joints=[swing]"
+def test_a_log_of_it_on_the_ground_is_not_compared(made: Callable[..., Path]) -> None:
+    with pytest.raises(InputError) as error:
+        check_hinges(robot(str(made(GANTRY))), "walks")
+    line = "on the ground no log of joints that slide is compared, and way, reach, grip slide; log the robot in the air"
+    assert str(error.value) == f"walks: {line}"
 
 
 def test_placeholders_of_a_slide(made: Callable[..., Path]) -> None:

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.slides import levers
+from gsl.diagnosis.angles import say, write_angle
 from gsl.diagnosis.design.motions import Choice, ladder, motions
 from gsl.diagnosis.design.questions import NOTHING, Question, find_hidden, find_rivals, find_twins
 from gsl.diagnosis.design.rehearsal import Rehearsal
@@ -51,13 +53,15 @@ def write_next_experiment(findings: Findings, robot: str, folder: Path) -> Mappi
         What the report says of it, None if the log leaves nothing open that a motion in the air would show.
     """
     log = findings.log
-    best = next_experiment(findings, motions(robot, log.robot, log.period))
+    ways = levers(log.robot)[: len(log.joints)]
+    best = next_experiment(findings, [choice.scaled(1.0 / ways) for choice in motions(robot, log.robot, log.period)])
     if best is None:
         return None
     about = {"excitation": best.excitation, "separates": best.separates, "why": best.why}
     if not best.episodes:
         return about | {"file": None}
-    write_commands(folder / COMMANDS, Commands(log.robot.name, log.joints, log.period, best.episodes, about))
+    episodes = tuple((name, ways * targets) for name, targets in best.episodes)
+    write_commands(folder / COMMANDS, Commands(log.robot.name, log.joints, log.period, episodes, about))
     return about | {"file": COMMANDS}
 
 
@@ -114,11 +118,13 @@ def _ladder(unsure: tuple[Droop, ...], findings: Findings) -> NextExperiment:
     most = max(unsure, key=lambda droop: droop.apart)
     seconds = log.period * sum(len(targets) for _, targets in choice.episodes)
     joints, (first, last) = ", ".join(droop.joint for droop in unsure), most.torques
+    (pull, of_pull), (way, of_way) = say(log.robot, (most.joint,), "N·m"), say(log.robot, (most.mover,), "rad")
     why = (
         f"This log cannot tell a shifted zero from another droop under gravity in {joints}. On a ladder of poses a "
-        f"zero stays and gravity's torque changes: in {most.joint} from {first:+.2f} to {last:+.2f} N·m with "
-        f"{most.mover} between {most.ends[0]:.2f} and {most.ends[1]:.2f} rad, which sets the two "
-        f"{1e3 * most.apart:.0f} mrad apart; {seconds:.0f} s with a second variant and a repeat."
+        f"zero stays and gravity's torque changes: in {most.joint} from {pull * first:+.2f} to {pull * last:+.2f} "
+        f"{of_pull} with {most.mover} between {way * most.ends[0]:.2f} and {way * most.ends[1]:.2f} {of_way}, which "
+        f"sets the two {write_angle(log.robot, most.joint, most.apart, '.0f')} apart; {seconds:.0f} s with a second "
+        "variant and a repeat."
     )
     return NextExperiment("pose_ladder", (PAIR,), choice.episodes, why)
 

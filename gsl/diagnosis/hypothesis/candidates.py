@@ -14,7 +14,8 @@ from typing import Any, Literal, NamedTuple, get_args, get_origin, get_type_hint
 import numpy as np
 
 from gsl.core.body import Robot, carrier, lump
-from gsl.core.setting import Setting
+from gsl.core.setting import Setting, settings_of
+from gsl.diagnosis.angles import list_scope, say
 from gsl.diagnosis.settings import GridSettings
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.effects.effect import effect_class, list_documented, names
@@ -93,6 +94,16 @@ class Candidate:
     def scope(self) -> str:
         """Where it acts, in a word."""
         return str(self.fixed.get("joints", self.fixed.get("link", "")))
+
+    def say(self, robot: Robot) -> list[tuple[float, str]]:
+        """Return what takes each free parameter to what a reader is told, and its unit, see `angles.say`."""
+        settings = settings_of(effect_class(self.effect))
+        joints = list_scope(robot, self.scope) if self.on_joints else []
+        return [say(robot, joints, settings[name].unit) for name in self.free]
+
+    def tell(self, robot: Robot, values: np.ndarray) -> np.ndarray:
+        """Return values of the free parameters, shape (..., p), as a reader is told them."""
+        return values * [factor for factor, _ in self.say(robot)]
 
     def on(self, joints: str) -> Candidate:
         """Return the same on other joints."""

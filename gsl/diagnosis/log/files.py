@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from gsl.core.body import Robot
+from gsl.core.body import Robot, lump
 from gsl.core.interfaces import REAL
 from gsl.core.other_commands import OTHER_COMMANDS, has_other_commands
+from gsl.core.plant import Plant
+from gsl.core.slides import unit_of_slide
 from gsl.core.trajectory import Batch
+from gsl.diagnosis.angles import with_log_in_angles
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.settings import LogSettings
 from gsl.errors import ArtifactError, InputError, TrajectoryError
@@ -24,7 +27,7 @@ CLOCKS, APART = "clocks", "unsynchronised"  # of a log's metadata, as gsl import
 MOVES = 1e-4  # a command that changes less is constant [rad]
 LATE = 0.5  # of a control period, by which a row may come early or late
 FASTER, SLOW = 10.0, 0.05  # times the slope of the positions that velocities may be; slopes below are noise [rad/s]
-BEYOND = 0.35  # measured past a joint's limits by more than this is another unit or another robot [rad]
+BEYOND = 0.35  # [rad], or `Joint.size`s, past a joint's limits: more is another unit or another robot
 
 
 def log_files(reference: str) -> list[Path]:
@@ -77,25 +80,28 @@ def read_logs(reference: str) -> Batch:
     return replace(first, episodes=episodes, metadata={**first.metadata, **clocks, "episodes": labels})
 
 
-def read_motions(reference: str, robot: Robot, held_out: Mapping[str, Any] | None = None) -> Log:
-    """Return logs of a robot in the air, of which a part is held out.
+def take_motions(
+    batch: Batch, plant: Plant, reference: str, held_out: Mapping[str, Any] | None = None
+) -> tuple[Log, Plant]:
+    """Return logs of a robot in the air, of which a part is held out, and its plant, both with slides in angles.
 
     Args:
-        reference: A run, a file or a folder of files.
-        robot: Whose logs they are.
+        batch: The logs.
+        plant: Of their robot.
+        reference: What a user calls the logs.
         held_out: Labels of the trajectories that are for checking; every second motion by default.
 
     Raises:
         InputError: They cannot be replayed, the robot stood on the ground, or they are too few.
     """
-    batch = read_logs(reference)
-    check_log(batch, robot, reference)
+    check_log(batch, lump(plant.robot), reference)
     if on_ground(batch):
         raise InputError(f"{reference}: needs the robot in the air; see `gsl collect task=excite`")
-    log = cut_log(batch, robot, held_out=held_out or {})
+    batch, plant = with_log_in_angles(batch, plant)
+    log = cut_log(batch, lump(plant.robot), held_out=held_out or {})
     if not len(log.train) or not len(log.held_out):
         raise InputError(f"{reference}: too little to fit and to check: two motions of some seconds are the least")
-    return log
+    return log, plant
 
 
 def share_clock(batch: Batch, asked: str | None) -> bool:
@@ -140,7 +146,7 @@ def check_log(batch: Batch, robot: Robot, name: str) -> None:
         )
     _check_units(batch, robot, name)
     _check_beside(batch, robot, name)
-    _check_velocities(batch, name)
+    _check_velocities(batch, robot, name)
 
 
 def check_joints(batch: Batch, robot: Robot, name: str) -> None:
@@ -175,16 +181,18 @@ def _check_time(batch: Batch, name: str) -> None:
             )
 
 
-def _check_velocities(batch: Batch, name: str) -> None:
+def _check_velocities(batch: Batch, robot: Robot, name: str) -> None:
     """Refuse velocities that are many times the slope of the positions: they are in another unit."""
     for k, joint in enumerate(batch.joints):
         slopes = [np.gradient(episode.position[:, k], batch.control_period) for episode in batch.episodes]
         logged = [episode.velocity[:, k] for episode in batch.episodes]
         size, own = (float(np.sqrt(np.mean(np.concatenate(speeds) ** 2))) for speeds in (slopes, logged))
-        if own > FASTER * max(size, SLOW):
+        slow, slides = SLOW * robot.joint(joint).size, robot.joint(joint).slides
+        if own > FASTER * max(size, slow):
+            units = "m/s, are these millimetres?" if slides else "rad/s, are these degrees?"
             raise InputError(
-                f"{name}: velocity.{joint} is {own / max(size, SLOW):.3g} times the slope of position.{joint}; "
-                "velocities are in rad/s, are these degrees?"
+                f"{name}: velocity.{joint} is {own / max(size, slow):.3g} times the slope of position.{joint}; "
+                f"velocities are in {units}"
             )
 
 
@@ -199,9 +207,10 @@ def _check_beside(batch: Batch, robot: Robot, name: str) -> None:
             ]
             reach, most = max((float(np.abs(values).max()) for values in columns), default=0.0), robot.joint(joint)
             if reach > FASTER * getattr(most, limit):
+                unit = unit_of_slide(UNITS[group]) if most.slides else UNITS[group]
                 problem = f"{group}.{joint} reaches {reach:.4g}, the joint's limit is {getattr(most, limit):.3g}"
                 hint = "another unit? A value that stands for none? Leave that signal out of the mapping"
-                raise InputError(f"{name}: {problem} {UNITS[group]}; {hint}")
+                raise InputError(f"{name}: {problem} {unit}; {hint}")
 
 
 def _check_units(batch: Batch, robot: Robot, name: str) -> None:
@@ -211,10 +220,11 @@ def _check_units(batch: Batch, robot: Robot, name: str) -> None:
         limits = robot.joint(joint)
         for what in ("action", "position"):
             values = np.concatenate([getattr(episode, what)[:, k] for episode in batch.episodes])
-            beyond = float(max(limits.lower - values.min(), values.max() - limits.upper))
+            beyond = float(max(limits.lower - values.min(), values.max() - limits.upper)) / limits.size
             reaches.append((beyond, f"{what}.{joint}", float(values[np.argmax(np.abs(values))]), limits))
     beyond, column, far, limits = max(reaches, key=lambda reach: reach[0])
     if beyond > BEYOND:
-        hint = "are these degrees?" if abs(far) > 2.0 * np.pi else "is the zero or the sign another?"
-        bounds = f"[{limits.lower:.2f}, {limits.upper:.2f}] rad"
+        other = "are these millimetres?" if limits.slides else "are these degrees?"
+        hint = other if abs(far) > 2.0 * np.pi * limits.size else "is the zero or the sign another?"
+        bounds = f"[{limits.lower:.2f}, {limits.upper:.2f}] {'m' if limits.slides else 'rad'}"
         raise InputError(f"{name}: {column} reaches {far:.3g}, beyond the joint's limits {bounds}; {hint}")

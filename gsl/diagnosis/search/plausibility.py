@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gsl.core.body import Robot
 from gsl.core.other_commands import split_other_commands
 from gsl.core.plant import Plant
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
@@ -44,7 +45,8 @@ def refute(
     evidence = Evidence(log, plant, with_it, settings or PlausibilitySettings())
     reasons: dict[str, str] = {}
     for candidate, values in hypothesis.pairs:
-        parameters = ", ".join(f"{name} {value:.3g}" for name, value in zip(candidate.free, values, strict=True))
+        told = zip(candidate.free, candidate.tell(log.robot, values), strict=True)
+        parameters = ", ".join(f"{name} {value:.3g}" for name, value in told)
         rule = _RULES.get(candidate.effect)
         if not candidate.claims_its_name(values):
             reasons[candidate.effect] = f"it would take {parameters}, outside the documented range"
@@ -53,19 +55,21 @@ def refute(
     return reasons
 
 
-def find_idle(hypothesis: Hypothesis, widening: float) -> dict[str, str]:
+def find_idle(hypothesis: Hypothesis, widening: float, robot: Robot) -> dict[str, str]:
     """Return the effects whose intervals hold what does nothing, in all their strengths, with the reason.
 
     Args:
         hypothesis: With its fit.
         widening: How much wider an interval is than noise alone makes it.
+        robot: Whose log it is.
     """
     reasons = {}
     for candidate, (low, high) in zip(hypothesis.candidates, hypothesis.intervals(widening), strict=True):
         strong, neutral = candidate.strong, candidate.neutral
         if strong.any() and ((low <= neutral) & (neutral <= high))[strong].all():
             k = int(np.argmax(strong))
-            holds = f"{candidate.free[k]} {low[k]:.3g} to {high[k]:.3g}, holds {neutral[k]:g}"
+            told = candidate.tell(robot, np.array([low, high, neutral]))[:, k]
+            holds = f"{candidate.free[k]} {told[0]:.3g} to {told[1]:.3g}, holds {told[2]:g}"
             reasons[candidate.effect] = f"its 95 % interval, {holds}, which does nothing"
     return reasons
 

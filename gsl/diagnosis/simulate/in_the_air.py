@@ -11,6 +11,7 @@ import numpy as np
 
 from gsl.core.body import lump
 from gsl.core.plant import Plant
+from gsl.core.slides import in_metres, levers
 from gsl.diagnosis.log.records import Pieces, Record, group_alike
 from gsl.diagnosis.simulate.calibration import calibrate
 from gsl.effects.effect import apply_all, build
@@ -103,14 +104,21 @@ def play(
 
 def replay_in_bullet(plant: Plant, pieces: Pieces, *, step: float, period: float, iterations: int) -> np.ndarray:
     """Return what Bullet answers to windows in the air, encoders' bias included [rad], shape (W, T, n_joints)."""
-    joints = pieces.real.shape[2]
+    joints, way = pieces.real.shape[2], levers(plant.robot)
     positions = np.empty(pieces.real.shape)
     for conditions, group in pieces.alike:
-        engine = Engine(change(plant, conditions), Physics(step, iterations, period, floating=False))
+        engine = Engine(in_metres(change(plant, conditions)), Physics(step, iterations, period, floating=False))
         for k in group:
-            positions[k] = _replay_window(engine, *(values[k] for values in pieces.windows))[:, :joints]
+            commands, motion, clock = (values[k] for values in pieces.windows)
+            positions[k] = (_replay_window(engine, _in_metres(commands, way), motion * way, clock) / way)[:, :joints]
         engine.close()
     return positions + plant.sensors.bias[:joints]
+
+
+def _in_metres(commands: np.ndarray, way: np.ndarray) -> np.ndarray:
+    """Return commands to motors with these levers in metres and newtons, see `ServoState.commands`."""
+    one = np.ones_like(way)
+    return commands * np.concatenate([way, way, 1.0 / way, one, one])[: commands.shape[1]]
 
 
 def _replay_window(engine: Engine, commands: np.ndarray, motion: np.ndarray, clock: float) -> np.ndarray:

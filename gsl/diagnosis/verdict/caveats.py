@@ -7,7 +7,9 @@ from typing import Any
 
 import numpy as np
 
+from gsl.core.body import Robot
 from gsl.core.words import several
+from gsl.diagnosis.angles import say, write_angle
 from gsl.diagnosis.hypothesis.candidates import Candidate
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
 from gsl.diagnosis.log.records import FEW
@@ -41,15 +43,15 @@ def caveats(
         shrunk: From `shrinkage`.
         far: Parts of the log that are not explained, from `find_unexplained`.
     """
-    about_fit = (_droops(unsure), _remaining(findings, shrunk, far))
+    about_fit = (_droops(findings, unsure), _remaining(findings, shrunk, far))
     parts = (*about_fit, _log(findings), _joints(findings), _causes(findings))
     return [sentence for part in parts for sentence in part]
 
 
-def _droops(unsure: Sequence[Droop]) -> Iterator[str]:
+def _droops(findings: Findings, unsure: Sequence[Droop]) -> Iterator[str]:
     if not unsure:
         return
-    zeros = ", ".join(f"{droop.joint} {1e3 * droop.zero:+.0f} mrad" for droop in unsure)
+    zeros = ", ".join(f"{droop.joint} {write_angle(findings.log.robot, droop.joint, droop.zero)}" for droop in unsure)
     yield (
         "Inseparable in this log, in which gravity hardly changes: a shifted zero and another droop under gravity, "
         f"by a load or a gain that is off. The fit calls it a zero: {zeros}."
@@ -148,20 +150,22 @@ def out_of_family(findings: Findings) -> list[str]:
     joints = []
     for k in np.argsort(-off.max(axis=0), kind="stable"):
         rows = [row for row in np.argsort(-off[:, k]) if off[row, k] >= findings.options.verdict.off]
-        parts = [_shift(row, shifts[row, k], log.robot.torque_unit, inertias[k]) for row in rows]
+        parts = [_shift(log.robot, log.joints[k], row, shifts[row, k], inertias[k]) for row in rows]
         joints += [f"{log.joints[k]} ({', '.join(parts)})"] if parts else []
     return joints
 
 
-def _shift(row: int, value: float, torque_unit: float, unit: float) -> str:
+def _shift(robot: Robot, joint: str, row: int, value: float, inertia: float) -> str:
     if row in (KP, KD):
         return f"{NAMES[row]} × {np.exp(value):.2f}"
     if row in (ZERO, OFFSET):
-        return f"{NAMES[row]} {1e3 * value:+.0f} mrad"
+        return f"{NAMES[row]} {write_angle(robot, joint, value)}"
     if row == INERTIA:
         end = ", at its limit" if value in INERTIAS else ""
-        return f"inertia {1e3 * unit * value:+.2g} g·m²{end}"
-    return f"{NAMES[row]} {torque_unit * value:+.2g} {'N·m' if row == COULOMB else 'N·m·s/rad'}"
+        factor, unit = say(robot, (joint,), "kg·m²")
+        return f"inertia {1e3 * factor * inertia * value:+.2g} {unit.removeprefix('k')}{end}"
+    factor, unit = say(robot, (joint,), "N·m" if row == COULOMB else "N·m·s/rad")
+    return f"{NAMES[row]} {factor * robot.torque_unit * value:+.2g} {unit}"
 
 
 def _causes(findings: Findings) -> Iterator[str]:
@@ -170,23 +174,28 @@ def _causes(findings: Findings) -> Iterator[str]:
         return
     selection, chosen = findings.selection, findings.selection.chosen
     for candidate, values in chosen.pairs:
-        for free, value, low, high in zip(candidate.free, values, *candidate.documented, strict=True):
+        told = candidate.tell(findings.log.robot, np.vstack([values, candidate.documented]))
+        for free, value, low, high in zip(candidate.free, *told, strict=True):
             if not low <= value <= high:
                 yield f"{_words(candidate, free)} of {value:.3g} is beyond what is documented, {low:g} to {high:g}."
     larger = next((fit for fit in selection.tried if _extends(fit.places, chosen.places)), None)
     why = None if larger is None else selection.objection(larger)
     if larger is not None and why is not None:
-        yield _otherwise(chosen, larger, why)
+        yield _otherwise(findings.log.robot, chosen, larger, why)
 
 
-def _otherwise(chosen: Hypothesis, larger: Hypothesis, why: str) -> str:
+def _otherwise(robot: Robot, chosen: Hypothesis, larger: Hypothesis, why: str) -> str:
     """Return what values would be with further effects, which cost less and were passed over."""
     parameters = {(candidate.effect, candidate.scope): values for candidate, values in larger.pairs}
     further = ", ".join(effect.replace("_", " ") for effect in larger.names if effect not in chosen.names)
     instead = [
         f"{_words(candidate, free)} {other:.3g} instead of {value:.3g}"
         for candidate, here in chosen.pairs
-        for free, value, other in zip(candidate.free, here, parameters[candidate.effect, candidate.scope], strict=True)
+        for free, value, other in zip(
+            candidate.free,
+            *candidate.tell(robot, np.vstack([here, parameters[candidate.effect, candidate.scope]])),
+            strict=True,
+        )
     ]
     return (
         f"With {further} besides, which costs less and was passed over ({why}): {', '.join(instead)}. Intervals are "

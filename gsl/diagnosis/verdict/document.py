@@ -9,17 +9,21 @@ from typing import Any
 import numpy as np
 
 from gsl.core.body import Robot
-from gsl.core.setting import settings_of
+from gsl.core.slides import levers
+from gsl.diagnosis.angles import list_scope
 from gsl.diagnosis.hypothesis.candidates import Candidate
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
+from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.settings import VerdictSettings
 from gsl.diagnosis.simulate.calibration import inertia_unit, no_shifts
 from gsl.diagnosis.verdict.caveats import caveats
 from gsl.diagnosis.verdict.findings import Findings
 from gsl.diagnosis.verdict.localise import cells, find_regimes, horizon, sides
+from gsl.diagnosis.verdict.servo_law import Form
+from gsl.diagnosis.verdict.servo_terms import TIME
 from gsl.diagnosis.verdict.shrinkage import find_unexplained, shrinkage
 from gsl.diagnosis.verdict.verdict import Cause, Verdict
-from gsl.diagnosis.verdict.zero_or_load import find_droops
+from gsl.diagnosis.verdict.zero_or_load import Droop, find_droops
 from gsl.effects.effect import describe_confusion, effect_class
 
 RANKED = 12  # hypotheses that are listed
@@ -52,7 +56,7 @@ def document(findings: Findings, **about: Any) -> dict[str, Any]:
         "doubt": how_sure,
         "suspects": suspects if verdict.word == "unknown" else [],
         "inseparable": [list(group) for group in verdict.inseparable if causes],
-        "droops": [asdict(droop) for droop in unsure],
+        "droops": [_droop(log.robot, droop) for droop in unsure],
         "where": [place for place in places if place["named"] or place["regime"] == "all"],
         "horizon": {"time": times, "rms": growth},
         "sides": sides(log, z),
@@ -63,11 +67,12 @@ def document(findings: Findings, **about: Any) -> dict[str, Any]:
         "floor": {
             "source": log.noise.source,
             "pairs": log.noise.pairs,
-            "sd": dict(zip(log.channels, log.comparison.floor.tolist(), strict=True)),
+            "sd": dict(zip(log.channels, (log.comparison.floor * _ways(log)).tolist(), strict=True)),
         },
         "invisible": list(findings.selection.screening.invisible),
         "unexplained": far,
-        "forms": [asdict(form) for form in findings.forms],
+        "slides": [name for name in log.joints if log.robot.joint(name).slides],
+        "forms": [_form(log.robot, form) for form in findings.forms],
         "caveats": caveats(findings, unsure, shrunk, far),
         "limits": [],
         "next_experiment": None,
@@ -128,7 +133,7 @@ def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
         "joints": _joints(findings.log.robot, candidate),
         "scope": candidate.scope,
         "fixed": {key: value for key, value in candidate.fixed.items() if key != "joints"},
-        "parameters": _parameters(candidate, values, interval),
+        "parameters": _parameters(findings.log.robot, candidate, values, interval),
         "probability": cause.probability,
         "gain": {"value": cause.value, "low": cause.low, "high": cause.high},
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
@@ -139,22 +144,19 @@ def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
 def _joints(robot: Robot, candidate: Candidate) -> list[str]:
     if not candidate.on_joints:
         return []
-    scope = candidate.scope
-    members = robot.controlled if scope == "all" else robot.groups.get(scope, (scope,))
-    return [name for name in members if name in robot.controlled]
+    return list_scope(robot, candidate.scope)
 
 
-def _parameters(candidate: Candidate, values: np.ndarray, interval: np.ndarray) -> dict[str, Any]:
-    settings = settings_of(effect_class(candidate.effect))
-    columns = (candidate.free, values, candidate.neutral, *interval)
+def _parameters(robot: Robot, candidate: Candidate, values: np.ndarray, interval: np.ndarray) -> dict[str, Any]:
+    columns = (candidate.free, candidate.say(robot), values, candidate.neutral, *interval)
     return {
         name: {
-            "value": float(value),
-            "low": float(low),
-            "high": float(high),
-            "unit": settings[name].unit or ("×" if neutral == 1.0 else ""),
+            "value": factor * float(value),
+            "low": factor * float(low),
+            "high": factor * float(high),
+            "unit": unit or ("×" if neutral == 1.0 else ""),
         }
-        for name, value, neutral, low, high in zip(*columns, strict=True)
+        for name, (factor, unit), value, neutral, low, high in zip(*columns, strict=True)
     }
 
 
@@ -169,7 +171,7 @@ def _ranking(findings: Findings) -> list[dict[str, Any]]:
             {
                 "effects": list(fit.names),
                 "scopes": [candidate.scope for candidate in fit.candidates],
-                "parameters": "; ".join(_write(*pair) for pair in fit.pairs),
+                "parameters": "; ".join(_write(findings.log.robot, *pair) for pair in fit.pairs),
                 "gain": {"value": value, "low": low, "high": high},
                 "level": fit.level,
                 "behind": fit.cost - selection.chosen.cost,
@@ -179,24 +181,51 @@ def _ranking(findings: Findings) -> list[dict[str, Any]]:
     return rows
 
 
-def _write(candidate: Candidate, values: np.ndarray) -> str:
-    return ", ".join(f"{name} {value:.3g}" for name, value in zip(candidate.free, values, strict=True))
+def _write(robot: Robot, candidate: Candidate, values: np.ndarray) -> str:
+    told = zip(candidate.free, candidate.tell(robot, values), strict=True)
+    return ", ".join(f"{name} {value:.3g}" for name, value in told)
+
+
+def _ways(log: Log) -> np.ndarray:
+    """Return the levers of the joints, and 1 of a base's channels, shape (n_channels,)."""
+    ways = np.ones(len(log.channels))
+    ways[: len(log.joints)] = levers(log.robot)[: len(log.joints)]
+    return ways
+
+
+def _droop(robot: Robot, droop: Droop) -> dict[str, Any]:
+    """Return a droop as the report has it, in metres and newtons where a joint slides."""
+    way, mover = robot.joint(droop.joint).lever, robot.joint(droop.mover).lever
+    return asdict(droop) | {
+        "zero": way * droop.zero,
+        "apart": way * droop.apart,
+        "ends": [mover * end for end in droop.ends],
+        "torques": [torque / way for torque in droop.torques],
+    }
+
+
+def _form(robot: Robot, form: Form) -> dict[str, Any]:
+    """Return a form as the report has it, its curve in metres and newtons where the joint slides."""
+    way = robot.joint(form.joint).lever
+    along = 1.0 if form.form == TIME else way
+    return asdict(form) | {"x": [along * x for x in form.x], "y": [y / way for y in form.y]}
 
 
 def _calibration(findings: Findings) -> list[dict[str, Any]]:
     unit, inertias = findings.log.robot.torque_unit, inertia_unit(findings.uncalibrated.servo)
-    columns = zip(findings.log.joints, findings.shifts.T, inertias, strict=False)  # coupled motors follow
+    ways = levers(findings.log.robot)
+    columns = zip(findings.log.joints, findings.shifts.T, inertias, ways, strict=False)  # coupled motors follow
     return [
         {
             "joint": joint,
             "kp": float(np.exp(kp)),
             "kd": float(np.exp(kd)),
-            "coulomb": unit * float(coulomb),
-            "viscous": unit * float(viscous),
-            "zero": float(zero + offset),
-            "inertia": float(inertia * rotor),
+            "coulomb": unit * float(coulomb / way),
+            "viscous": unit * float(viscous / way**2),
+            "zero": float((zero + offset) * way),
+            "inertia": float(inertia * rotor / way**2),
         }
-        for joint, (kp, kd, coulomb, zero, offset, inertia, viscous), rotor in columns
+        for joint, (kp, kd, coulomb, zero, offset, inertia, viscous), rotor, way in columns
     ]
 
 
@@ -211,7 +240,8 @@ def _replays(findings: Findings, before: np.ndarray, after: np.ndarray) -> list[
         record = cut.record[held[int(np.argmax(square[:, joint]))]]
         windows = np.flatnonzero(cut.record == record)[: TICKS // cut.scored]
         parts = {"command": cut.targets(n), "real": cut.real, "before": before, "after": after}
-        lines = {key: part[windows][:, first:, joint].ravel().tolist() for key, part in parts.items()}
+        way = log.robot.joint(log.joints[joint]).lever
+        lines = {key: (way * part[windows][:, first:, joint]).ravel().tolist() for key, part in parts.items()}
         ticks = (cut.tick[windows][:, None] + first + 1 + np.arange(cut.scored)).ravel()
         times = (log.period * ticks).tolist()
         pictures.append({"record": log.records[record].name, "joint": log.joints[joint], "time": times, **lines})

@@ -11,6 +11,7 @@ import numpy as np
 
 from gsl.core.plant import Plant
 from gsl.core.setting import settings_of
+from gsl.diagnosis.angles import effects_in_metres
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import Log
@@ -110,7 +111,7 @@ class Findings:
 
     @property
     def effects(self) -> dict[str, Any]:
-        """What the simulator lacks: the reference's findings, the diagnosed effects, then the calibration.
+        """What the simulator lacks: the reference's findings, the diagnosed effects, then the calibration; in metres.
 
         Every entry is one of a world's `effects:`; the calibration comes joint by joint. Where nothing may be named it
         is all there is.
@@ -120,7 +121,7 @@ class Findings:
         if self.baseline is not None:
             own = to_effects(joints, self.baseline.shifts, self.simulator.plant)
             parts = [self.baseline.effects, own, *parts]
-        return join_effects(*parts)
+        return join_effects(*(effects_in_metres(part, self.log.robot) for part in parts))
 
 
 def join_effects(*parts: Mapping[str, Any]) -> dict[str, Any]:

@@ -90,9 +90,11 @@ def _limit(findings: Findings, candidate: Candidate) -> Limit | None:
     for _ in range(how.halvings):
         middle = float(np.sqrt(low * high))
         low, high = (low, middle) if surely_worse(middle) else (middle, high)
-    unit = settings_of(effect_class(candidate.effect))[name].unit
-    most = max(high * documented, findings.log.robot.encoder_step if unit == "rad" else 0.0)
-    return Limit(candidate.effect, name, unit, most, documented) if most < how.limit * documented else None
+    angle = settings_of(effect_class(candidate.effect))[name].unit == "rad"
+    most = max(high * documented, findings.log.robot.encoder_step if angle else 0.0)
+    ((factor, unit),) = candidate.say(findings.log.robot)
+    limit = Limit(candidate.effect, name, unit, factor * most, factor * documented)
+    return limit if most < how.limit * documented else None
 
 
 def _fit_beside(findings: Findings, candidate: Candidate, value: float, at: Hypothesis) -> Hypothesis:

@@ -10,7 +10,9 @@ import numpy as np
 
 from gsl.core.body import lump
 from gsl.core.plant import Plant
+from gsl.core.slides import levers
 from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis.angles import with_log_in_angles
 from gsl.diagnosis.log.files import on_ground
 from gsl.diagnosis.log.log import spread
 from gsl.diagnosis.wiring.fault import Fault
@@ -18,7 +20,7 @@ from gsl.diagnosis.wiring.options import by_relation, permutations
 from gsl.diagnosis.wiring.outcome import Wiring
 from gsl.diagnosis.wiring.physics import Fit
 from gsl.diagnosis.wiring.search import Search, cut_motions
-from gsl.diagnosis.wiring.words import describe, remedy
+from gsl.diagnosis.wiring.words import Channels, describe, remedy
 from gsl.errors import GslError
 from gsl.storage.signals.check import check_signals, mend_signals
 from gsl.storage.signals.finding import Finding
@@ -34,16 +36,14 @@ class Audit:
     """What an audit found.
 
     Attributes:
-        joints: Names of the log's joints.
-        period: Control period of the log [s].
+        channels: Of the log.
         signals: What is wrong with the signals, seen without a simulator.
         wiring: What a search against the simulator found, None if there was none to make.
         seen: Faults that are seen without a replay, where the robot is on the ground.
         remarks: What else is to be said.
     """
 
-    joints: tuple[str, ...]
-    period: float
+    channels: Channels
     signals: tuple[Finding, ...]
     wiring: Wiring | None
     seen: tuple[Fault, ...]
@@ -107,8 +107,11 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
         step: Its physics period [s].
         tick: Called after every replay.
     """
-    robot = lump(plant.robot)
+    batch, plant = with_log_in_angles(batch, replace(plant, robot=lump(plant.robot)))
+    robot = plant.robot
     batch = _in_order(batch, robot.controlled)
+    ways = tuple(levers(robot)[: len(robot.controlled)].tolist())
+    channels = Channels(batch.joints, batch.control_period, ways)
     signals = check_signals(batch.episodes, batch.joints)
     mended = replace(batch, episodes=tuple(mend_signals(batch.episodes)))
     spoiled = {
@@ -120,26 +123,25 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
     excluded = frozenset(k for k, joint in enumerate(batch.joints) if joint in spoiled)
     wiring, seen, remarks = None, list[Fault](), list[str]()
     if on_ground(batch):
-        seen = _find_seen(mended, replace(plant, robot=robot))
+        seen = _find_seen(mended, plant)
         remarks.append("On the ground nothing is replayed: what only a replay shows was not looked for.")
     elif len(excluded) == len(batch.joints):
         remarks.append("No joint is left to compare with the simulator.")
     else:
         try:
-            plant = replace(plant, robot=robot)
             floor = cut_motions(mended, plant).noise.sd
             wiring = Search(take_part(mended), plant, step, floor, excluded, tick).run()
         except GslError as error:
             remarks.append(f"Nothing was replayed: {error}.")
     if wiring and wiring.doubted:
-        like = describe(wiring.doubted, batch.joints, batch.control_period)
+        like = describe(wiring.doubted, channels)
         remarks.insert(0, f"Too little to tell wiring from physics: {like} Larger and other motions would tell.")
     if wiring and wiring.late:
         rows = f"{wiring.late} row{'s' * (wiring.late > 1)}"
         delay = f"{1e3 * wiring.late * batch.control_period:.4g} ms"
         alike = f"columns that are {rows} apart look like this, and so does a latency of {delay}"
         remarks.insert(0, f"Commands act {rows} later: {alike}.")
-    return Audit(batch.joints, batch.control_period, tuple(signals), wiring, tuple(seen), tuple(remarks))
+    return Audit(channels, tuple(signals), wiring, tuple(seen), tuple(remarks))
 
 
 def _of_velocity(finding: Finding) -> bool:
@@ -205,24 +207,28 @@ def _signal(finding: Finding) -> dict[str, Any]:
     }
 
 
+def _in_metres(key: str, value: Any, levers: Sequence[float]) -> Any:
+    return (np.array(value) * levers).tolist() if key == "offset" else value
+
+
 def _fault(
     about: Audit, fault: Fault, before: Fit | None, after: Fit | None, rivals: Sequence[Fault]
 ) -> dict[str, Any]:
     own = list(fault.joints)
-    names = [about.joints[k] for k in own]
+    names = [about.channels.joints[k] for k in own]
     columns = [f"{side}.{name}" for side in ("action", "position") if fault.side in (side, "both") for name in names]
     return {
         "kind": fault.kind,
         "joints": names,
         "columns": columns,
         "side": fault.side,
-        "value": {key: value for key, value in fault.value.items()},
+        "value": {key: _in_metres(key, value, about.channels.levers) for key, value in fault.value.items()},
         "episode": None,
         "row": None,
         "times": 1,
-        "sentence": describe(fault, about.joints, about.period),
-        "remedy": remedy(fault, about.joints),
+        "sentence": describe(fault, about.channels),
+        "remedy": remedy(fault, about.channels),
         "before": None if before is None else float(np.sqrt((before.rms[own] ** 2).mean())),
         "after": None if after is None else float(np.sqrt((after.rms[own] ** 2).mean())),
-        "or": [describe(rival, about.joints, about.period) for rival in rivals],
+        "or": [describe(rival, about.channels) for rival in rivals],
     }

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.plant import Plant
+from gsl.core.slides import levers
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.files import BEYOND
 from gsl.diagnosis.wiring.fault import ACTION, BOTH, POSITION, Fault, gains, hold, permute, rate, rescale, shift
@@ -16,6 +17,7 @@ from gsl.diagnosis.wiring.relation import FOLLOWS, Relation, relate
 
 UNITS = {"deg": np.pi / 180.0, "ticks/4096": 2.0 * np.pi / 4096.0, "ticks/1024": 2.0 * np.pi / 1024.0,
          "turn": 2.0 * np.pi, "mrad": 1e-3, "%": 0.01}  # fmt: skip
+LENGTHS = ("mrad", "%")  # of these units, what a slide has as well: mm and cm for m
 RANGES = {"-1 to 1": (-1.0, 1.0), "0 to 1": (0.0, 1.0), "-100 to 100": (-100.0, 100.0), "0 to 100": (0.0, 100.0)}
 NEAR = 1.18  # factor by which a ratio may differ from that of a unit: quick motion arrives smaller than commanded
 USUAL = (0.55, 1.8)  # factors from command to position that physics explains
@@ -59,7 +61,7 @@ def by_relation(batch: Batch, plant: Plant) -> Iterator[Spread]:
     for side in (ACTION, POSITION):
         if opposite.any():
             yield Spread("sign", side, np.where(opposite, -1.0, nothing), np.zeros(len(own)), {})
-    yield from _units(follows, clear)
+    yield from _units(follows, clear, _ways(plant))
     yield from _propose_shares(follows, clear, plant)
     factor = np.abs(follows.factor)
     usual = clear & (follows.likeness > 0.0) & (factor > USUAL[0]) & (factor < USUAL[1])
@@ -71,13 +73,14 @@ def by_relation(batch: Batch, plant: Plant) -> Iterator[Spread]:
         yield Spread("offset", POSITION, np.where(far, 1.0, nothing), -sizes, value)
 
 
-def _units(follows: Relation, clear: np.ndarray) -> Iterator[Spread]:
+def _units(follows: Relation, clear: np.ndarray, ways: np.ndarray) -> Iterator[Spread]:
     """Yield commands or positions that are in another unit, or scaled by a factor that has no name."""
     factor = np.abs(follows.factor)
     odd = clear & ((factor < USUAL[0]) | (factor > USUAL[1]))
     for name, unit in UNITS.items():
         for side, ratio in ((ACTION, unit), (POSITION, 1.0 / unit)):
             fits = odd & (np.abs(np.log(np.where(factor > 0.0, factor, 1e-9) / ratio)) < np.log(NEAR))
+            fits &= (ways == 1.0) | (name in LENGTHS)
             if fits.any():
                 zero = _zero(follows, side, unit)
                 yield Spread("scale", side, np.where(fits, unit, np.nan), -unit * zero, {"unit": name})
@@ -100,7 +103,8 @@ def _propose_shares(follows: Relation, clear: np.ndarray, plant: Plant) -> Itera
     """Yield commands or positions that are given as shares of the joints' ranges."""
     lower, upper = _limits(plant)
     factor = np.abs(follows.factor)
-    for name, (low, high) in RANGES.items():
+    for name, ends in RANGES.items():
+        low, high = (end / _ways(plant) for end in ends)
         unit, offset = _spread_out(lower, upper, low, high)
         for side, ratio in ((ACTION, unit), (POSITION, 1.0 / unit)):
             fits = clear & (np.abs(np.log(np.where(factor > 0.0, factor, 1e-9) / ratio)) < np.log(NEAR))
@@ -111,7 +115,7 @@ def _propose_shares(follows: Relation, clear: np.ndarray, plant: Plant) -> Itera
 
 def by_range(batch: Batch, plant: Plant) -> Iterator[Spread]:
     """Yield units in which both commands and positions may be: the one follows the other all the same."""
-    lower, upper = _limits(plant)
+    (lower, upper), ways = _limits(plant), _ways(plant)
     values = np.concatenate([np.vstack([episode.action, episode.position]) for episode in batch.episodes])
     least, most = values.min(axis=0), values.max(axis=0)
     for name, unit in UNITS.items():
@@ -120,10 +124,12 @@ def by_range(batch: Batch, plant: Plant) -> Iterator[Spread]:
             fits = (
                 (small > lower - 0.5) & (large < upper + 0.5) & (np.maximum(np.abs(least), np.abs(most)) * unit > 0.01)
             )
+            fits &= (ways == 1.0) | (name in LENGTHS)
             if fits.any() and unit < 1.0:
                 shifted = np.full(len(lower), -unit * zero)
                 yield Spread("scale", BOTH, np.where(fits, unit, np.nan), shifted, {"unit": name, "zero": zero})
-    for name, (low, high) in RANGES.items():
+    for name, ends in RANGES.items():
+        low, high = (end / ways for end in ends)
         size, offset = _spread_out(lower, upper, low, high)
         width = high - low
         fits = (least >= low - (OVER - 1.0) * width) & (most <= high + (OVER - 1.0) * width)
@@ -149,7 +155,14 @@ def _limits(plant: Plant) -> tuple[np.ndarray, np.ndarray]:
     return np.array([interval.lower for interval in ranges]), np.array([interval.upper for interval in ranges])
 
 
-def _spread_out(lower: np.ndarray, upper: np.ndarray, low: float, high: float) -> tuple[np.ndarray, np.ndarray]:
+def _ways(plant: Plant) -> np.ndarray:
+    """Return the levers of the joints, shape (n_joints,): a slide's columns were divided by them."""
+    return levers(plant.robot)[: len(plant.robot.controlled)]
+
+
+def _spread_out(
+    lower: np.ndarray, upper: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Return what one unit of a normalised range is [rad], and the angle at its zero [rad], shapes (n_joints,)."""
     unit = (upper - lower) / (high - low)
     return unit, lower - unit * low
