@@ -47,6 +47,8 @@ HEADER_BYTES = 10_000
 URDF_BYTES = 20_000_000
 JOINTS = 500
 """Of a URDF; a humanoid with both hands has about 80."""
+MOVING = 120
+"""Joints of a URDF that turn or slide: Bullet ends the process with 128, those of the base included."""
 MESH_BYTES = 100_000_000
 """Of a mesh: two million triangles."""
 SECONDS = 10.0

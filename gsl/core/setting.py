@@ -49,6 +49,9 @@ def setting(
     return field
 
 
+MOST = 2**63 - 1  # of a whole number, which libraries in C keep in 64 bits
+
+
 @dataclass_transform(frozen_default=True, field_specifiers=(Field,))
 def component(cls: type) -> Any:
     """Make a class a frozen dataclass that checks its fields and refuses unknown ones.
@@ -56,14 +59,17 @@ def component(cls: type) -> Any:
     Fields may have any type; one that is a `Protocol` has to be `runtime_checkable`.
     """
     config = ConfigDict(extra="forbid", arbitrary_types_allowed=True, allow_inf_nan=False)
-    cls._no_truth_value = field_validator("*", mode="before")(_no_truth_value)  # type: ignore[attr-defined]
+    cls._check_number = field_validator("*", mode="before")(_check_number)  # type: ignore[attr-defined]
     return validated_dataclass(frozen=True, config=config)(cls)
 
 
-def _no_truth_value(cls: Any, value: Any, about: ValidationInfo) -> Any:
-    """Refuse true and false where a number is due: Python would take them for 1 and 0."""
-    if isinstance(value, bool) and cls.__pydantic_fields__[about.field_name].annotation in (int, float):
+def _check_number(cls: Any, value: Any, about: ValidationInfo) -> Any:
+    """Refuse true and false where a number is due, which Python takes for 1 and 0, and counts that no library takes."""
+    kind = cls.__pydantic_fields__[about.field_name].annotation
+    if isinstance(value, bool) and kind in (int, float):
         raise PydanticCustomError("truth_value", "Input should be a number")
+    if kind is int and isinstance(value, int) and value > MOST:
+        raise PydanticCustomError("less_than_equal", "Input is too large", {"le": MOST})
     return value
 
 

@@ -12,7 +12,7 @@ from xml.etree import ElementTree as xml
 import numpy as np
 
 from gsl.core.body import Link
-from gsl.core.budget import JOINTS, URDF_BYTES, open_file, within
+from gsl.core.budget import JOINTS, MOVING, URDF_BYTES, open_file, within
 from gsl.core.validation import did_you_mean
 from gsl.errors import InputError
 from gsl.robots.joint_limits import ENDS
@@ -131,6 +131,8 @@ def _root(path: Path) -> xml.Element:
         raise InputError(f"{path}: {problem}; expand it first: xacro {path.name} > robot.urdf")
     if (count := max(len(root.findall("joint")), len(root.findall("link")))) > JOINTS:
         raise InputError(f"{path}: has {count:,} joints or links; {JOINTS} are read")
+    if (count := sum(joint.get("type") != "fixed" for joint in root.findall("joint"))) > MOVING:
+        raise InputError(f"{path}: has {count:,} joints that move; {MOVING} are simulated at most")
     return root
 
 

@@ -47,10 +47,10 @@ class BulletWorld:
     effects: Annotated[Mapping[str, Any], setting("what this world adds to the nominal robot, by name")]
     floating: Annotated[bool, setting("base on the ground (true) or held in the air (false)")] = True
     step: Annotated[float, setting("physics period", unit="s", ge=FINEST, le=0.02)] = 0.002
-    iterations: Annotated[int, setting("iterations of the constraint solver", ge=1)] = 50
+    iterations: Annotated[int, setting("iterations of the constraint solver", ge=1, le=10_000)] = 50
     period: Annotated[float, setting("control period", unit="s", gt=0, le=0.1)] = 0.02
     start_noise: Annotated[float, setting("standard deviation of the joints at the start", unit="rad", ge=0)] = 0.03
-    settle: Annotated[float, setting("time the start posture is held before the episode", unit="s", ge=0)] = 0.5
+    settle: Annotated[float, setting("time the start posture is held before the episode", unit="s", ge=0, le=600)] = 0.5
     servo: Annotated[str | None, setting("learned servo that acts on top: a path or run of train-servo")] = None
     servo_member: Annotated[int, setting("which member of the learned servo, the first is 0", ge=0)] = 0
     motors: Annotated[

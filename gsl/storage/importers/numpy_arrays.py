@@ -8,6 +8,7 @@ import zipfile
 import zlib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -21,7 +22,7 @@ from gsl.storage.importers.sizes import DAMAGED
 END = ".npy"
 MOST = 2**40  # of a dimension: an array of nothing may be as long as it says, and no memory holds it
 _DAMAGED = (OSError, EOFError, zipfile.BadZipFile, zlib.error, struct.error)
-_NO_HEADER = (ValueError, SyntaxError, TypeError, EOFError, zlib.error, MemoryError, RecursionError)
+_NO_HEADER = (ValueError, SyntaxError, TokenError, TypeError, EOFError, zlib.error, MemoryError, RecursionError)
 
 
 class NpzArrays:
