@@ -33,15 +33,15 @@ def replays(document: Document) -> Markup | None:
 
 
 def _replay(entry: Document, scale: Scale) -> Markup | None:
-    time, real = [finite(at) for at in entry.get("time") or []], _shown(entry.get("real"), scale)
-    curves = [Curve(label, kind, time, _shown(entry.get(key), scale)) for key, label, kind in _LINES if entry.get(key)]
+    time, real = [finite(at) for at in entry.get("time") or []], _show(entry.get("real"), scale)
+    curves = [Curve(label, kind, time, _show(entry.get(key), scale)) for key, label, kind in _LINES if entry.get(key)]
     chart = line_chart(curves, x="time [s]", y=f"{read_word(entry, 'joint')} [{scale.unit}]")
     if chart is None:
         return None
     distances = [
         f"{short(distance, 2)}{'' if scale.unit == '°' else ' '}{scale.unit} {label}"
         for key, label in (("before", "from the robot as it was"), ("after", "with the effects"))
-        if (distance := _rms(_shown(entry.get(key), scale), real)) is not None
+        if (distance := _rms(_show(entry.get(key), scale), real)) is not None
     ]
     title = f"{read_word(entry, 'joint')} in {read_word(entry, 'record')}" + (
         f": {', '.join(distances)}" if distances else ""
@@ -49,7 +49,7 @@ def _replay(entry: Document, scale: Scale) -> Markup | None:
     return element("div", element("h3", title), chart, kind="replay")
 
 
-def _shown(positions: Sequence[Any] | None, scale: Scale) -> list[float | None]:
+def _show(positions: Sequence[Any] | None, scale: Scale) -> list[float | None]:
     numbers = [finite(position) for position in positions or []]
     return [None if number is None else scale.factor * number for number in numbers]
 

@@ -97,13 +97,13 @@ def found(effect: str = "", joint: str = "rail", **parameters: float) -> Finding
     return diagnose(logged(effects), nominal(gantry()), STEP, FEW, lambda _: None)
 
 
-def same(one: Plant, other: Plant) -> None:
-    for name in one.servo._fields:
-        np.testing.assert_allclose(getattr(one.servo, name), getattr(other.servo, name), rtol=1e-9, err_msg=name)
+def same(plant: Plant, other: Plant) -> None:
+    for name in plant.servo._fields:
+        np.testing.assert_allclose(getattr(plant.servo, name), getattr(other.servo, name), rtol=1e-9, err_msg=name)
     for name in ("action_noise", "torque_noise"):
-        np.testing.assert_allclose(getattr(one, name), getattr(other, name), rtol=1e-9)
+        np.testing.assert_allclose(getattr(plant, name), getattr(other, name), rtol=1e-9)
     for name in ("encoder_noise", "bias"):
-        np.testing.assert_allclose(getattr(one.sensors, name), getattr(other.sensors, name), rtol=1e-9)
+        np.testing.assert_allclose(getattr(plant.sensors, name), getattr(other.sensors, name), rtol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -149,9 +149,9 @@ def test_a_learned_servo_is_the_same_in_metres() -> None:
     numbers = {name: np.abs(0.01 * rng.standard_normal(4)) for name in NUMBERS}
     network = {name: 0.05 * rng.standard_normal(values.shape) for name, values in model.network.items()}
     learned = replace(model, numbers=numbers, network=network, lag=0.02 * rng.standard_normal(model.lag.shape))
-    told = learned.in_metres(angular, plant).on(plant)
-    same(in_angles(told), learned.on(angular))
-    metres = Held.of(told, STEP, PERIOD).replay(window(targets))[0]
+    sliding = learned.in_metres(angular, plant).on(plant)
+    same(in_angles(sliding), learned.on(angular))
+    metres = Held.of(sliding, STEP, PERIOD).replay(window(targets))[0]
     angles = Held.of(learned.on(angular), STEP, PERIOD).replay(window(targets / way))[0]
     np.testing.assert_allclose(angles * way, metres, atol=1e-9)
     assert np.abs(metres - Held.of(plant, STEP, PERIOD).replay(window(targets))[0]).max() > 1e-3
@@ -164,8 +164,8 @@ def test_an_effect_in_angles_is_one_in_metres(effect: str, scope: Any) -> None:
     ranges = list_documented(effect, angular.robot).items()
     entry: dict[str, Any] = {"joints": scope}
     entry |= {key: 0.3 * each.lower + 0.7 * each.upper for key, each in ranges if each.upper is not None}
-    told = effects_in_metres({effect: [entry]}, angular.robot)
-    same(in_metres(change(angular, {effect: [entry]})), change(nominal(gantry()), told))
+    metric = effects_in_metres({effect: [entry]}, angular.robot)
+    same(in_metres(change(angular, {effect: [entry]})), change(nominal(gantry()), metric))
 
 
 def test_a_log_goes_into_angles_with_its_torques_and_conditions() -> None:
@@ -201,11 +201,11 @@ def test_a_cause_is_named_in_units_of_its_joint(effect: str) -> None:
     findings = found(effect, **parameters)
     (cause,) = document(findings)["causes"]
     assert (cause["effect"], cause["scope"]) == (effect, "rail")
-    told = cause["parameters"][name]
-    assert told["unit"] == unit and told["value"] == pytest.approx(value, rel=0.1)
-    assert told["low"] < value < told["high"]
+    number = cause["parameters"][name]
+    assert number["unit"] == unit and number["value"] == pytest.approx(value, rel=0.1)
+    assert number["low"] < value < number["high"]
     entry = findings.effects[effect][0]
-    assert entry["joints"] == "rail" and entry[name] == pytest.approx(told["value"], rel=1e-3)
+    assert entry["joints"] == "rail" and entry[name] == pytest.approx(number["value"], rel=1e-3)
 
 
 def test_the_report_is_in_metres_and_newtons() -> None:

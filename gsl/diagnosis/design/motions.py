@@ -40,7 +40,7 @@ class Choice:
     name: str
     variants: tuple[tuple[str, np.ndarray], ...]
 
-    def scaled(self, factors: np.ndarray) -> Choice:
+    def scale(self, factors: np.ndarray) -> Choice:
         """Return the same with joints that go so many times as far, shape (n_joints,)."""
         return Choice(self.name, tuple((name, factors * targets) for name, targets in self.variants))
 

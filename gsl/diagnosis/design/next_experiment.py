@@ -54,7 +54,7 @@ def write_next_experiment(findings: Findings, robot: str, folder: Path) -> Mappi
     """
     log = findings.log
     ways = levers(log.robot)[: len(log.joints)]
-    best = next_experiment(findings, [choice.scaled(1.0 / ways) for choice in motions(robot, log.robot, log.period)])
+    best = next_experiment(findings, [choice.scale(1.0 / ways) for choice in motions(robot, log.robot, log.period)])
     if best is None:
         return None
     about = {"excitation": best.excitation, "separates": best.separates, "why": best.why}

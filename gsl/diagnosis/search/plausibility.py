@@ -45,8 +45,8 @@ def refute(
     evidence = Evidence(log, plant, with_it, settings or PlausibilitySettings())
     reasons: dict[str, str] = {}
     for candidate, values in hypothesis.pairs:
-        told = zip(candidate.free, candidate.tell(log.robot, values), strict=True)
-        parameters = ", ".join(f"{name} {value:.3g}" for name, value in told)
+        numbers = zip(candidate.free, candidate.tell(log.robot, values), strict=True)
+        parameters = ", ".join(f"{name} {value:.3g}" for name, value in numbers)
         rule = _RULES.get(candidate.effect)
         if not candidate.claims_its_name(values):
             reasons[candidate.effect] = f"it would take {parameters}, outside the documented range"
@@ -68,8 +68,8 @@ def find_idle(hypothesis: Hypothesis, widening: float, robot: Robot) -> dict[str
         strong, neutral = candidate.strong, candidate.neutral
         if strong.any() and ((low <= neutral) & (neutral <= high))[strong].all():
             k = int(np.argmax(strong))
-            told = candidate.tell(robot, np.array([low, high, neutral]))[:, k]
-            holds = f"{candidate.free[k]} {told[0]:.3g} to {told[1]:.3g}, holds {told[2]:g}"
+            numbers = candidate.tell(robot, np.array([low, high, neutral]))[:, k]
+            holds = f"{candidate.free[k]} {numbers[0]:.3g} to {numbers[1]:.3g}, holds {numbers[2]:g}"
             reasons[candidate.effect] = f"its 95 % interval, {holds}, which does nothing"
     return reasons
 

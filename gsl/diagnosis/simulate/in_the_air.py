@@ -117,8 +117,8 @@ def replay_in_bullet(plant: Plant, pieces: Pieces, *, step: float, period: float
 
 def _in_metres(commands: np.ndarray, way: np.ndarray) -> np.ndarray:
     """Return commands to motors with these levers in metres and newtons, see `ServoState.commands`."""
-    one = np.ones_like(way)
-    return commands * np.concatenate([way, way, 1.0 / way, one, one])[: commands.shape[1]]
+    shares = np.ones_like(way)
+    return commands * np.concatenate([way, way, 1.0 / way, shares, shares])[: commands.shape[1]]
 
 
 def _replay_window(engine: Engine, commands: np.ndarray, motion: np.ndarray, clock: float) -> np.ndarray:

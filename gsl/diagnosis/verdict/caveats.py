@@ -174,8 +174,8 @@ def _causes(findings: Findings) -> Iterator[str]:
         return
     selection, chosen = findings.selection, findings.selection.chosen
     for candidate, values in chosen.pairs:
-        told = candidate.tell(findings.log.robot, np.vstack([values, candidate.documented]))
-        for free, value, low, high in zip(candidate.free, *told, strict=True):
+        numbers = candidate.tell(findings.log.robot, np.vstack([values, candidate.documented]))
+        for free, value, low, high in zip(candidate.free, *numbers, strict=True):
             if not low <= value <= high:
                 yield f"{_words(candidate, free)} of {value:.3g} is beyond what is documented, {low:g} to {high:g}."
     larger = next((fit for fit in selection.tried if _extends(fit.places, chosen.places)), None)

@@ -182,8 +182,8 @@ def _ranking(findings: Findings) -> list[dict[str, Any]]:
 
 
 def _write(robot: Robot, candidate: Candidate, values: np.ndarray) -> str:
-    told = zip(candidate.free, candidate.tell(robot, values), strict=True)
-    return ", ".join(f"{name} {value:.3g}" for name, value in told)
+    numbers = zip(candidate.free, candidate.tell(robot, values), strict=True)
+    return ", ".join(f"{name} {value:.3g}" for name, value in numbers)
 
 
 def _ways(log: Log) -> np.ndarray:
