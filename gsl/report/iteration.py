@@ -9,6 +9,7 @@ from typing import Any
 
 from gsl.core.interfaces import Task
 from gsl.core.unit import Unit, format_gain
+from gsl.core.words import falls
 from gsl.report.evaluation_cells import ends, format_ends
 from gsl.report.flight import Flight
 from gsl.report.learning_curve import Search, learning_curve, search
@@ -183,10 +184,20 @@ class Rounds:
         if self.best is None:
             reached = f"{unit.format(after['value'])} (95 % {unit.interval(after['interval'])})"
             sentence = f"No policy better than π0 was found. π0 is returned; it reaches {reached} on the real side."
-            return Answer(question, sentence, sure=False, more=[self.verdict])
+            return Answer(question, sentence, sure=False, more=[self.verdict, *self._without])
         over = "π0" if figures["returned_iteration"] == 1 else "the iteration before"
         sentence, sure = describe_gain("The returned policy", after, before, gain, unit, over)
-        return Answer(question, sentence, sure, more=[self.verdict])
+        return Answer(question, sentence, sure, more=[self.verdict, *self._without])
+
+    @property
+    def _without(self) -> list[str]:
+        """What the same search returned without grounding, in a sentence; none if nobody asked."""
+        if self._beside is None:
+            return []
+        returned, unit = self._beside.metrics["returned"], self._unit
+        fell = f", {falls(returned['falls'])} in {returned['episodes']} fresh episodes" if unit.falls else ""
+        reached = f"{unit.format(returned['value'])} (95 % {unit.interval(returned['interval'])})"
+        return [f"Without grounding the same search returned a policy with {reached}{fell}."]
 
     @property
     def budget(self) -> list[tuple[str, str]]:

@@ -114,6 +114,9 @@ def test_a_curve_says_what_came_out_without_grounding() -> None:
     rounds.add(evaluation(0.2, 0.25, 0.02, 0.08), 10)
     rounds.add_beside(evaluation(0.2, 0.22, 0.01, 0.03))
     assert rounds.title == "Real side: 25.0 cm/s with grounding, 22.0 without, π0 20.0"
+    without = rounds.answer.more[-1]
+    assert without.startswith("Without grounding the same search returned a policy with 22.0 cm/s (95 % ")
+    assert without.endswith("), no falls in 10 fresh episodes.")
 
 
 def test_an_environment_that_ends_has_not_fallen() -> None:
