@@ -71,10 +71,8 @@ def importable(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def ordered() -> list[tuple[str, ...]]:
-    """The page's commands; the wiring is looked at when there is a policy, and seeds have a test of their own."""
-    typed = [command.words for command in commands(PAGE)]
-    looked, rest = [words for words in typed if "wiring" in words], [words for words in typed if "wiring" not in words]
-    return [rest[0], *looked, *(words for words in rest[1:] if "examples/bring/seeds.py" not in words)]
+    """The page's commands in its order; seeds have a test of their own."""
+    return [command.words for command in commands(PAGE) if "examples/bring/seeds.py" not in command.words]
 
 
 def run(words: tuple[str, ...], folder: Path) -> None:
