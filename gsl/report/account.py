@@ -165,6 +165,10 @@ def _bounds(interval: list[float | None]) -> list[float]:
 def describe_choice(metrics: Mapping[str, Any], unit: Unit) -> str:
     """Return in a line what an evaluation chose, what that is worth beside π0, and what it cost."""
     spent = f"{metrics['real_episodes']} real episodes"
+    if not metrics["policies"]:
+        measured = metrics["baseline"]
+        value = f"{unit.format(measured['value'])} (95 % {unit.interval(measured['interval'])})"
+        return f"{metrics['best']} alone was measured: {value}, {unit.describe_ends(measured)}; {spent}"
     if not metrics["best_generation"]:
         faster = "stable policy was faster" if unit.falls else "policy was better"
         better = "faster policy passed its check" if metrics["failed_check"] else faster

@@ -27,8 +27,9 @@ def write_evaluation_page(
         change: Of the policy, from the first to the best.
         unit: Of the task.
     """
-    question, choice = "Which of these policies is the best on the real side?", describe_choice(metrics, unit)
-    sentence, sure = f"{choice[0].upper()}{choice[1:]}.", False
+    alone, choice = not metrics["policies"], describe_choice(metrics, unit)
+    sentence, sure = f"{choice[0].upper()}{choice[1:]}.", alone
+    question = f"{'How good is this policy' if alone else 'Which of these policies is the best'} on the real side?"
     if metrics["best_generation"]:
         after, before, gain = (metrics[key] for key in ("returned", "baseline", "gain"))
         sentence, sure = describe_gain(metrics["best"], after, before, gain, unit)
@@ -39,8 +40,7 @@ def write_evaluation_page(
     spent = [(words, str(sum(row["episodes"] for row in document[phase]))) for phase, words in _PHASES.items()]
     sections = [
         section("Policies on the real side", table(columns, rows)),
-        curves([searched], unit.name),
-        parameters(change),
+        *([] if alone else [curves([searched], unit.name), parameters(change)]),
         budget([*spent, ("in all", str(metrics["real_episodes"]))]),
     ]
     write_page(folder, answer, sections)

@@ -52,8 +52,8 @@ PI0, BEST = measured("pi0", None, 0.19), measured("generation_01", 1, 0.21)
 DOCUMENT = {"policies": [PI0, BEST, measured("generation_02", 2, 0.05, falls=1)], "check": [BEST],
             "confirmation": [PI0, BEST]}  # fmt: skip
 METRICS = {
-    "best": "generation_01", "best_generation": 1, "returned": BEST, "baseline": PI0, "real_episodes": 18,
-    "gain": {"value": 0.02, "interval": [0.004, 0.036], "share": 0.1}, "failed_check": [],
+    "best": "generation_01", "best_generation": 1, "policies": 2, "returned": BEST, "baseline": PI0,
+    "gain": {"value": 0.02, "interval": [0.004, 0.036], "share": 0.1}, "failed_check": [], "real_episodes": 18,
 }  # fmt: skip
 CHANGE = Change(("step-x", "swing"), (0.2, 1.0), (0.25, 0.9), (0.1, 0.5))
 
@@ -71,6 +71,13 @@ def test_an_evaluation_says_its_gain_with_its_interval_and_shows_what_the_table_
     assert "step-x 0.2 0.25 +0.50" in said and "swing 1 0.9 −0.20" in said
     assert "episodes to choose 9 episodes to check 3 fresh episodes to report 6 in all 18" in said
     assert "fell on the real side" in said  # marked in the learning curve
+
+
+def test_a_policy_alone_has_neither_curve_nor_change(tmp_path: Path) -> None:
+    alone = {**METRICS, "best": "pi0", "best_generation": 0, "policies": 0, "returned": PI0}
+    said = words(written(tmp_path, alone))
+    assert "How good is this policy on the real side?" in said and "Pi0 alone was measured: 19.0 cm/s (95 % " in said
+    assert "Learning curves" not in said and "The policy before and after" not in said
 
 
 def test_a_gain_that_may_be_none_is_called_so(tmp_path: Path) -> None:

@@ -27,6 +27,7 @@ def metrics(before: float, after: float, low: float, high: float) -> dict[str, A
     return {
         "best": "generation_01",
         "best_generation": 1,
+        "policies": 1,
         "returned_value_sim": after,
         "baseline": measured(before),
         "returned": measured(after),
@@ -53,6 +54,12 @@ def test_a_value_is_never_its_gain(figures: tuple[float, ...], end: str) -> None
         f"generation_01 is returned: on fresh episodes {figures[1]:.1f}, no falls in 10; π0 -6.0; gain "
     )
     assert sentence.endswith(end)
+
+
+def test_a_policy_alone_is_better_than_none() -> None:
+    alone = {**metrics(-6.0, -6.0, 0.0, 0.0), "best": "pi0", "best_generation": 0, "policies": 0}
+    sentence = describe_choice(alone, Unit())
+    assert sentence == "pi0 alone was measured: -6.0 (95 % -7.0 to -5.0), no falls in 10; 30 real episodes"
 
 
 def test_the_verdict_says_which_iteration_is_returned_and_why_there_are_no_more() -> None:
