@@ -13,6 +13,7 @@ SITE := .venv-docs/.stamp
 HELP := 'from gsl.cli import app, call; [call([info.name, "--help"]) for info in app.registered_commands if info.name]'
 
 DEMO ?= name=demo beside=true force=true
+DEMO_RUN = $(or $(patsubst name=%,%,$(filter name=%,$(DEMO))),quick-start)
 
 help: ## Show this.
 	@grep -hE '^[a-z]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):.*## /make \1|/' | column -t -s '|'
@@ -21,8 +22,9 @@ install: $(INSTALLED) ## Install gsl, its experiments and its benchmarks from th
 
 demo: $(INSTALLED) ## Improve a walk for a "real" robot that the optimiser never touches; some minutes.
 	$(GSL) iterate $(DEMO)
+	$(GSL) render $(DEMO_RUN) out=runs/$(DEMO_RUN)/film.gif
 	@echo "what there is to look at:"
-	@find runs/demo -type f \( -name '*.png' -o -name '*.md' -o -name '*.parquet' -o -name 'policies.json' -o -name 'report.html' \) | sort
+	@find runs/$(DEMO_RUN) -type f \( -name '*.png' -o -name '*.gif' -o -name '*.md' -o -name '*.parquet' -o -name 'policies.json' -o -name 'report.html' \) | sort
 
 # Two workers have two cores: threads of matrix products would only be in their way. Each begins with one half of the
 # files and steals at the end, so that what a file makes for all of its tests is made once.

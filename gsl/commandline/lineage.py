@@ -11,7 +11,7 @@ from gsl.errors import ArtifactError
 from gsl.report.console import Console
 from gsl.storage.hashing import SHORT
 from gsl.storage.lineage import Ancestor, Seen, lineage
-from gsl.storage.references import RUNS, artifact_folders, resolve
+from gsl.storage.references import RUNS, artifact_folders, resolve_main
 
 if TYPE_CHECKING:
     from rich.tree import Tree
@@ -67,7 +67,7 @@ def draw_lineage(reference: str, console: Console) -> int:
     Raises:
         ArtifactError: There is no such artifact.
     """
-    root = lineage(resolve(reference), {})
+    root = lineage(resolve_main(reference), {})
     console.draw(_tree(root))
     wrong = [node for node in root.all() if node.problem]
     console.result(_document(root) | ({"exit_code": 1} if wrong else {}))

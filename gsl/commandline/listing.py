@@ -35,7 +35,7 @@ from gsl.storage.manifest import (
     read,
     strange_files,
 )
-from gsl.storage.references import RUNS, find_all, find_damaged, resolve
+from gsl.storage.references import RUNS, find_all, find_damaged, resolve, resolve_main
 
 
 def list_runs(words: Sequence[str], console: Console) -> None:
@@ -87,7 +87,7 @@ def show_artifact(reference: str, console: Console) -> int:
     Raises:
         ArtifactError: There is no such artifact.
     """
-    folder = resolve(reference)
+    folder = resolve_main(reference)
     artifact = Artifact(folder, read(folder))
     made = dataclasses.asdict(artifact.manifest)
     damaged = find_damage(folder, artifact.manifest)

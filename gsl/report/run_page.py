@@ -143,7 +143,8 @@ def curves(searches: Sequence[Search], unit: str) -> Markup | None:
     ]
     note = (
         "The best of each generation in simulation, and the same policies on the real side with 95 % intervals. "
-        "A cross marks a fall; hollow: it fell in a later test. The diamond was measured again on fresh episodes."
+        "A cross marks a fall; hollow: it fell in a later test. The diamond was measured again on fresh episodes. "
+        "The best of a generation that is missing was not tried on the real side."
     )
     return section("Learning curves", element("div", *drawn, kind="panels"), note=note)
 

@@ -160,3 +160,10 @@ def test_clean_goes_to_stale_and_orphaned_artifacts_when_asked_and_leaves_foreig
 def test_a_wrong_word_of_clean_is_one_line(home: Path) -> None:
     assert "there is name, orphaned, stale" in refused("clean", "all=true", folder=home)
     assert gsl("clean", "stale=perhaps", folder=home).code == 2
+
+
+@pytest.mark.parametrize("command", ["show", "lineage"])
+def test_the_name_of_a_whole_run_means_its_iterate(home: Path, command: str) -> None:
+    make("whole/iteration_01/optimize", "optimize", {"best": 0.2})
+    make("whole/iterate", "iterate", {"best": 0.2})
+    assert "whole/iterate" in "".join(done(command, "whole", folder=home)[1:])

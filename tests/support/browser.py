@@ -82,6 +82,10 @@ class Browser:
         while not self._loaded:
             self._hear()
 
+    def print(self) -> None:
+        """Show the page as paper would."""
+        self._ask("Emulation.setEmulatedMedia", media="print")
+
     def value(self, script: str) -> Any:
         """Return what a script says in the page."""
         answer = self._ask("Runtime.evaluate", expression=script, returnByValue=True)
