@@ -40,6 +40,8 @@ class Commands(TyperGroup):
 
     def __init__(self, **attributes: Any) -> None:
         super().__init__(**attributes)
+        for command in self.commands.values():  # in whole: click cuts the first line of a docstring at 45 characters
+            command.short_help = command.short_help or (command.help or "").partition("\n\n")[0]
         for name, entry_point in sorted(plugins().items()):
             self.commands.setdefault(name, StandIn(entry_point))
 

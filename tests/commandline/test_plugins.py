@@ -93,6 +93,7 @@ def listed(said: str) -> dict[str, str]:
 def test_help_names_a_command_before_its_package_is_imported(place: Path) -> None:
     commands = listed(done("--help", folder=place).out)
     assert commands["reach"] == "Say how far each joint moves in trajectories [rad]."
+    assert not [name for name, line in commands.items() if line.endswith("...")]
     assert (commands["tools"], commands["count"], commands["broken"]) == ("Small tools.", "Count.", "")
     assert {"my_gsl.reach", "my_gsl", "others.tools", "others.number"} & sys.modules.keys() == set()
 
