@@ -12,6 +12,7 @@ from gsl.errors import GslError, Waiting
 from gsl.report.console import Console
 
 INTERRUPTED = 130
+_NO_ARRAY = ("array is too big", "Maximum allowed")  # what numpy says of sizes that it does not even ask memory for
 
 
 def report(failure: BaseException, console: Console, *, command: str = "gsl") -> int:
@@ -44,7 +45,8 @@ def describe_failure(failure: BaseException) -> tuple[str, int]:
             return line, 1
     if (line := describe_own(failure)) is not None:
         return f"{line}; GSL_TRACEBACK=1 shows more", 1
-    if isinstance(failure, MemoryError) or isinstance(failure, OSError) and failure.errno == errno.ENOMEM:
+    absurd = isinstance(failure, ValueError) and text.startswith(_NO_ARRAY)
+    if absurd or isinstance(failure, MemoryError) or isinstance(failure, OSError) and failure.errno == errno.ENOMEM:
         return "there is not enough memory for this; free some, or try workers=1, or less at once", 1
     if isinstance(failure, OSError):
         return failure.strerror or text, 1

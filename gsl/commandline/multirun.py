@@ -19,14 +19,14 @@ from hydra.core.global_hydra import GlobalHydra
 from hydra.core.hydra_config import HydraConfig
 from joblib import register_parallel_backend
 from joblib._parallel_backends import LokyBackend
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 
-from gsl.commandline.composer import Composition
+from gsl.commandline.composer import Composition, OtherConfiguration
 from gsl.commandline.config import RUNS, execute, resolve
 from gsl.commandline.failure import describe_failure, report
 from gsl.commandline.known_settings import plain
 from gsl.commandline.overrides import file_of, key_of
-from gsl.commandline.own_word import check_own_word
+from gsl.commandline.own_word import check_own_word, check_servos
 from gsl.core.interruption import end_with_parent
 from gsl.errors import GslError
 from gsl.report.console import Console
@@ -99,6 +99,7 @@ def _launch(command: str, line: str, composition: Composition, folder: Path, *, 
         swept=composition.swept,
         trust=composition.trust,
         json=json,
+        place=OtherConfiguration.folder,
     )
     hydra = GlobalHydra.instance().hydra
     assert hydra is not None
@@ -123,15 +124,22 @@ def _launch(command: str, line: str, composition: Composition, folder: Path, *, 
 
 
 def run_job(
-    config: DictConfig, *, command: str, line: str, swept: Sequence[str], trust: Sequence[str], json: bool
-) -> Any:
-    """Run one job, leave its outcome in hydra's folder and return the figure that a sweeper may look at."""
+    config: DictConfig, *, command: str, line: str, swept: Sequence[str], trust: Sequence[str], json: bool,
+    place: Path | None,
+) -> Any:  # fmt: skip
+    """Run one job, leave its outcome in hydra's folder and return the figure that a sweeper may look at.
+
+    `place` is the folder of the user's yaml files, if there is one; the job may run in a process of a launcher.
+    """
     console = Console(json=json)
     hydra = HydraConfig.get()
     level = job_level(list(hydra.overrides.task), swept, int(hydra.job.num))
     console.status(f"job {hydra.job.num}: {level}")
     try:
-        check_own_word(plain(config), {key_of(word) for word in hydra.overrides.task})  # a job may be of other files
+        typed = list(hydra.overrides.task)
+        check_own_word(plain(config), {key_of(word) for word in typed})  # a job may be of other files
+        OmegaConf.set_struct(config := config.copy(), False)  # hydra's refuses to be asked for what it does not say
+        check_servos(config, typed, place)
         values = resolve(Composition(config, (), {}, ()))
         outcome = {"job": level, "exit_code": 0, **execute(command, line, values, console, trust=trust, level=level)}
     except Exception as failure:

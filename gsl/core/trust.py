@@ -35,7 +35,7 @@ def _of_class(name: str) -> str:
 
 
 def _of_robot(name: str) -> str:
-    return "" if name.lower().endswith(ROBOT_FILES) else name.rpartition(".")[0]
+    return "" if "/" in name or name.lower().endswith(ROBOT_FILES) else name.rpartition(".")[0]
 
 
 def _of_environment(name: str) -> str:

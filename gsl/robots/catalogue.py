@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import importlib
+import inspect
 import pkgutil
 from pathlib import Path
 
 from gsl.core.body import Robot
+from gsl.core.trust import is_ours
 from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError, InputError
 from gsl.robots.descriptions import PREFIX
@@ -69,10 +71,19 @@ def robot(name: str) -> Robot:
         hint = f"{did_you_mean(name, names(), listed=True)}, a file such as arm.urdf, or robot_descriptions:NAME"
         raise ConfigError("robot", f"no robot called '{name}'{hint}")
     try:
-        built: Robot = getattr(importlib.import_module(place), function)()
-        return built
+        build = getattr(importlib.import_module(place), function)
+        inspect.signature(build).bind()
     except (ImportError, AttributeError, ValueError) as error:
         raise ConfigError("robot", f"'{name}' cannot be imported: {error}") from error
+    except TypeError as error:
+        raise ConfigError("robot", f"'{name}' is no function that builds a robot of nothing: {error}") from error
+    promised = getattr(build, "__annotations__", {}).get("return")
+    if is_ours(place) and promised not in (Robot, Robot.__name__):  # any file may name it: it must do nothing else
+        raise ConfigError("robot", f"'{name}' is no function that builds a robot")
+    built = build()
+    if not isinstance(built, Robot):
+        raise ConfigError("robot", f"'{name}' returns a value of {type(built).__name__}, not a Robot")
+    return built
 
 
 def _there(name: str) -> Path:

@@ -177,6 +177,9 @@ class Sitting:
         """Hold and ramp out; return why the robot is not back, nothing if it is, or lies after what was a fall.
 
         Where something hangs, what became of the robot is told in any case.
+
+        Raises:
+            KeyboardInterrupt: The way back was broken off, after an episode without a fault.
         """
         try:
             try:
@@ -186,8 +189,11 @@ class Sitting:
                     raise
                 self._watched(self._player.leave, episode, hold)  # without reading
             return self._player.after_a_hang(named=isinstance(fault, Hangs))
-        except KeyboardInterrupt:
-            return f"{episode['name']}: the way back was broken off; the robot is left where it is"
+        except KeyboardInterrupt as error:
+            left = f"{episode['name']}: the way back was broken off; the robot is left where it is"
+            if fault is None:
+                raise KeyboardInterrupt(left) from error
+            return left
         except Lies as error:
             if not down:
                 return f"{episode['name']}: {error}"

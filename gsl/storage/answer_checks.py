@@ -13,14 +13,14 @@ from gsl.core.observation import observations
 from gsl.core.trajectory import Trajectory
 from gsl.errors import ArtifactError, InputError, TrajectoryError
 from gsl.runner.acting import Actor
-from gsl.runner.following import FAR, LAG, WHILE
+from gsl.runner.following import FAR, LAG, STILL, WHILE
 from gsl.runner.request import layout_of
 from gsl.storage.answers import HUGE, Answered
 from gsl.storage.importers.assembly import Episode
 from gsl.storage.importers.suspicions import lags_of, suspicions
 
 OUTSIDE = 0.5  # of its range that a joint may be found, as when the robot falls on it [rad]
-FROZEN = 1e-9  # range of positions of a joint that nobody reads any more [rad]
+FROZEN = 0.5 * STILL  # of `within`: less than the runner lets pass, for its second is not to the row
 OFF = 0.05  # by which an action may differ from what the policy does on what was observed [rad]
 SELDOM = 0.05  # share of the rows in which the runner's own actions may be off: where a policy has a threshold
 COPIED = 1e-5  # by which positions of two runs differ at least [rad]: an encoder's step is larger, and rounds less
@@ -123,7 +123,7 @@ def _find_lost(log: Trajectory, request: Mapping[str, Any]) -> Iterator[str]:
     late, whole = (max(1, round(seconds / period)) for seconds in (LAG, WHILE))
     position = log.position[:-1]
     if len(sent) > whole:
-        still = np.ptp(_windows(position, whole), axis=-1) <= FROZEN
+        still = np.ptp(_windows(position, whole), axis=-1) < FROZEN * within
         asked = np.ptp(_windows(sent, whole)[..., : whole - late], axis=-1)
         if (wrong := still & (asked > within)).any():
             row, joint = np.argwhere(wrong)[0]

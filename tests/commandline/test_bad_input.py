@@ -98,6 +98,11 @@ def test_an_artifact_that_is_missing_or_foreign(arguments: tuple[str, ...], line
     assert line in refused(*arguments, "out=runs/refused", folder=chain)
 
 
+def test_sizes_that_no_array_has_are_too_much_memory(tmp_path: Path) -> None:
+    said = gsl("optimize", *SMALL, "grounding=none", f"rollouts={10**18}", folder=tmp_path)
+    assert said.code == 1 and "there is not enough memory for this" in said.lines[-1]
+
+
 def test_an_artifact_of_another_version_is_named(chain: Path) -> None:
     manifest = chain / "runs/chain/optimize/manifest.json"
     whole = manifest.read_text()

@@ -499,6 +499,21 @@ def test_settings_of_hydra_of_another_kind_are_one_line(tmp_path: Path) -> None:
     assert said.code == 2 and len(said.lines) == 1 and "hydra: its settings cannot be read" in said.lines[0]
 
 
+def test_a_robot_of_a_world_file_is_what_a_function_of_robots_builds(tmp_path: Path) -> None:
+    world = tmp_path / "theirs/world/w.yaml"
+    world.parent.mkdir(parents=True)
+    for robot, problem in (
+        ("gsl.robots.catalogue.names", "is no function that builds a robot"),
+        ("gsl.robots.catalogue.robot", "is no function that builds a robot of nothing"),
+        ("gsl.robots.hinges.math", "is no function that builds a robot of nothing"),
+        ("gsl_experiments.commands.main", "world.robot"),
+        ("../elsewhere/arm.txt", "no robot called '../elsewhere/arm.txt'"),
+    ):
+        world.write_text(f"defaults: [urdf, _self_]\nrobot: {robot}\n")
+        words = ("collect", "--config-dir=theirs", "world=w", "task=excite", *SMALL)
+        assert problem in refused(*words, folder=tmp_path), robot
+
+
 def test_a_world_of_a_stranger_takes_a_servo_of_its_own_place_or_the_users_alone(tmp_path: Path) -> None:
     here = tmp_path / "here"
     world = here / "theirs/world/w.yaml"
@@ -520,3 +535,5 @@ def test_a_world_of_a_stranger_takes_a_servo_of_its_own_place_or_the_users_alone
     ):
         world.write_text(f"defaults: [learned, _self_]\nservo: {servo}\n")
         assert problem in refused(*words, *typed, folder=here), (servo, typed)
+    world.with_name("v.yaml").write_text("defaults: [learned, _self_]\nservo: ../elsewhere\n")
+    assert out in "".join(gsl(*words[:2], "--multirun", "world=nao_ideal,v", *SMALL, folder=here).lines)

@@ -80,6 +80,12 @@ def frozen(log: Trajectory) -> Trajectory:
     return replace(log, position=np.tile(log.position[:1], (len(log.position), 1)))
 
 
+def dithering(log: Trajectory) -> Trajectory:
+    """The log of motors without power, whose encoders see noise."""
+    noise = np.sin(np.arange(log.position.size)).reshape(log.position.shape)
+    return replace(log, position=log.position[:1] + 1e-3 * noise)
+
+
 def stuck(log: Trajectory) -> Trajectory:
     """The log of a joint that nobody reads any more from a row on, while it is sent far away and back."""
     position = log.position.copy()
@@ -128,7 +134,7 @@ def test_an_answer_that_cannot_be_one_is_refused(
     assert problem in str(error.value) and str(error.value).startswith(str(tmp_path)) and "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("how", [frozen, stuck])
+@pytest.mark.parametrize("how", [frozen, dithering, stuck])
 def test_a_joint_that_stands_still_under_commands_is_refused_unless_it_ended_the_episode(
     air: Path, tmp_path: Path, how: Callable[[Trajectory], Trajectory]
 ) -> None:

@@ -6,6 +6,7 @@ import gzip
 import io
 import json
 import zipfile
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +67,16 @@ def test_a_chunk_of_an_hdf5_file_has_a_budget(tmp_path: Path) -> None:
         for name in ("t", "goal", "q"):
             file.create_dataset(name, (40,), "f8", maxshape=(None,), chunks=(100_000_000,), compression="gzip")
     assert "is stored in chunks of more than 256 MB" in told(tmp_path / "log.h5")
+
+
+def test_groups_of_an_hdf5_file_that_lie_in_each_other_twice_have_a_budget(tmp_path: Path) -> None:
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "log.h5", "w") as file:
+        groups = [file.create_group(f"group_{number}") for number in range(40)]
+        for outer, inner in pairwise(groups):
+            outer["a"] = outer["b"] = inner
+        groups[-1]["t"] = [0.0]
+    assert "listing its groups takes more than" in told(tmp_path / "log.h5")
 
 
 @pytest.mark.parametrize("shape", ["(" * 900, "(" + "9" * 400 + ",)", "(1000000000000000, 1000000000000000)"])

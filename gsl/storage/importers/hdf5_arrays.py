@@ -5,13 +5,13 @@ from __future__ import annotations
 import fnmatch
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from gsl.core.budget import COLUMNS, DEPTH, check_file, open_file
+from gsl.core.budget import COLUMNS, DEPTH, check_file, open_file, within
 from gsl.errors import InputError, TrajectoryError
 from gsl.storage.importers.array_table import Shapes
 from gsl.storage.importers.sizes import DAMAGED
@@ -31,7 +31,7 @@ def is_hdf5(path: Path) -> bool:
 def list_groups(path: Path, pattern: str) -> list[str]:
     """Return the groups whose path fits a pattern such as data/demo_*, in the order of their numbers."""
     parts = pattern.strip("/").split("/")
-    with _open(path) as file:
+    with _open(path) as file, _listing(path):
         paths = [""]
         for part in parts:
             below = [
@@ -48,7 +48,7 @@ class Hdf5Arrays:
 
     def __init__(self, path: Path, group: str, *, turned: bool = False) -> None:
         self.path, self.group, self.turned = path, group.strip("/"), turned
-        with _open(path) as file:
+        with _open(path) as file, _listing(path):
             root = _at(file, self.group)
             if root is None:
                 there = ", ".join(_names(file, "")) or "nothing"
@@ -92,6 +92,11 @@ def _open(path: Path) -> Iterator[Any]:
         raise
     except Exception as error:  # a damaged file ends the library in many ways
         raise TrajectoryError(path, f"is {DAMAGED}") from error
+
+
+def _listing(path: Path) -> AbstractContextManager[None]:
+    """Bound how long it takes to see what there is: groups that lie in each other twice have endless paths."""
+    return within(f"{path}: listing its groups")
 
 
 def _names(file: Any, group: str) -> list[str]:
