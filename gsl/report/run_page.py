@@ -118,7 +118,8 @@ def describe_origin(how: Origin | None) -> list[Part]:
     rows = [(f"made from {parent.role}", parent.path, parent.hash[:SHORT]) for parent in how.parents]
     rows += [(f"built {link.role}", link.path, link.hash[:SHORT]) for link in how.links]
     typed = not how.command.endswith(")") or how.command.startswith("gsl.")
-    again = command(how.command) if typed else element("p", f"A part of {how.command.partition(' (')[0]}.")
+    part = f"A part of {how.command.partition(' (')[0]}; gsl rerun and the folder of this page repeat it alone."
+    again = command(how.command) if typed else element("p", part)
     settings = fold("all settings", element("pre", element("code", how.settings)))
     return [
         section(

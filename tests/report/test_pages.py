@@ -25,7 +25,7 @@ from gsl.report.joint_trace import Traces
 from gsl.report.learning_curve import search
 from gsl.report.markdown import table as markdown
 from gsl.report.parts import element, join, prose, section, table
-from gsl.report.run_page import Answer, Change, curves, footfalls, joints, parameters, write_page
+from gsl.report.run_page import Answer, Change, curves, describe_origin, footfalls, joints, parameters, write_page
 from gsl.report.study_page import write_study_page
 from gsl.report.style import COLOURS, curve_figure, look
 from gsl.rollout.promise import promise
@@ -300,3 +300,10 @@ def test_a_log_that_cannot_be_read_costs_no_page_its_warnings(tmp_path: Path) ->
     built = cast(Any, dict.fromkeys(folders[1:]))
     warnings = Origin("gsl x", "", (), folders[0], built).warnings
     assert warnings[0] == "number 0\\u001b[2J" and len(warnings) == 51 and warnings[-1] == "31 more, in the logs"
+
+
+def test_a_part_of_a_chain_says_how_it_is_repeated_alone(tmp_path: Path) -> None:
+    typed = ("gsl iterate (it)", "gsl iterate")
+    said = [join(*describe_origin(Origin(command, "a: 1", (), tmp_path, {}))) for command in typed]
+    assert "A part of gsl iterate; gsl rerun and the folder of this page repeat it alone." in said[0]
+    assert "A part of" not in said[1] and "gsl iterate" in said[1]
