@@ -11,6 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+QUANTITIES = {"stiffness": "stiffness [N·m/rad]", "damping": "damping [N·m·s/rad]", "torque": "gives way at [N·m]"}
+"""What is said of how joints answer loads, by name in documents."""
+
 
 def phasors(values: np.ndarray, times: np.ndarray, frequency: float) -> np.ndarray:
     """Return the complex amplitudes A of Re(A exp(i omega t)) in columns, beside an offset and a trend, shape (n,).

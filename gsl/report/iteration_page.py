@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
+from gsl.core.impedance import QUANTITIES
 from gsl.core.words import in_unit
 from gsl.report.footfalls import Walk
 from gsl.report.grounding_errors import finding, grounding_errors_figure
@@ -71,9 +72,28 @@ def grounding(check: Mapping[str, Any] | None, diagnosis: Sequence[str]) -> Mark
     if errors:
         drawn = svg(grounding_errors_figure(errors, title="", width=WIDTH), "joint errors with and without grounding")
         said += [element("p", prose(f"{finding(errors)}.")), drawn]
+    if rows := _loads(check or {}):
+        said += [
+            element("p", "Loads on single joints in the air:"),
+            table(("joints", "", "simulator", "grounded"), rows),
+        ]
     said += [element("p", prose(f"The check says: {line}.")) for line in (check or {}).get("problems") or []]
     note = "The simulator starts in held-out real states and plays real actions for ten ticks." if errors else ""
     return section("What grounding changes", *said, note=note)
+
+
+def _loads(check: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Return how groups of joints answer loads in both simulators, as far as the check has measured it."""
+    return [
+        (
+            group,
+            title,
+            *("-" if (value := values.get(name)) is None else f"{value:.3g}" for name in ("sim", "grounded")),
+        )
+        for group, quantities in ((check.get("compliance") or {}).get("groups") or {}).items()
+        for quantity, title in QUANTITIES.items()
+        if (values := quantities.get(quantity))
+    ]
 
 
 def _errors(check: Mapping[str, Any]) -> Mapping[str, Mapping[str, Mapping[str, float]]]:

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.core.console import Console
-from gsl.core.impedance import compute_closure, compute_transfer
+from gsl.core.impedance import QUANTITIES, compute_closure, compute_transfer
 from gsl.core.interfaces import Grounding, World
 from gsl.core.seeds import derive_seed
 from gsl.grounding.ane import ActionNoise
@@ -25,7 +25,6 @@ SECTION = "compliance"  # of the grounding's report and of metrics
 RESOLUTION = 0.02  # share below which two measured values are the same: a bristle's spring adds as much
 SURELY = 2.0  # standard errors
 SIM, GROUNDED, REAL = "sim", "grounded", "real"
-QUANTITIES = {"stiffness": "stiffness [N·m/rad]", "damping": "damping [N·m·s/rad]", "torque": "gives way at [N·m]"}
 TITLE = "loads on single joints in the air"
 NOTHING = "no difference"
 

@@ -224,6 +224,9 @@ def test_what_the_check_measured_is_what_grounding_changes() -> None:
     said = words(str(grounding({"errors": {"pi0": spans}, "problems": ["π0 falls"]}, ["Diagnosis: causes."])))
     assert "Diagnosis: causes." in said and "The check says: π0 falls." in said
     assert "Grounding takes the joint error from 4.00° to 1.00° of π0." in said
+    loads = {"legs": {"stiffness": {"sim": 150.0, "grounded": 82.2}}}
+    said = words(str(grounding({"compliance": {"groups": loads}}, [])))
+    assert "joints simulator grounded legs stiffness [N·m/rad] 150 82.2" in said
     assert grounding(None, []) is None
 
 
