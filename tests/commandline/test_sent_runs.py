@@ -111,7 +111,8 @@ def test_a_run_without_what_it_was_made_from_may_be_whole(run: Path, tmp_path: P
     assert "not here" in done("show", "b", folder=tmp_path).out
     (child / "log.txt").write_text("another")
     said = gsl("verify", "b", folder=tmp_path)
-    assert said.lines == [gone, f"gsl verify: runs/b/import: log.txt is not as the manifest says; {AGAIN}"]
+    remedy = f"{gone}; copy it to this place"
+    assert said.lines == [remedy, f"gsl verify: runs/b/import: log.txt is not as the manifest says; {AGAIN}"]
     problems = json.loads(gsl("verify", "b", "--json", folder=tmp_path).out)["problems"]
     assert problems["runs/b/import"] == f"log.txt is not as the manifest says; {AGAIN}"
 
