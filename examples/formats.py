@@ -20,6 +20,7 @@ import yaml
 ROOT = Path(__file__).resolve().parents[1]
 JOINTS = tuple(yaml.safe_load((ROOT / "conf/mapping/go2_in_air.yaml").read_text())["joints"])
 MOTORS = tuple(yaml.safe_load((ROOT / "conf/mapping/unitree_go2.yaml").read_text())["joints"].values())
+GAINS = tuple(yaml.safe_load((ROOT / "conf/mapping/go2_in_air.yaml").read_text())["about"].values())  # kp, kd
 STEP = 360.0 / 4095.0  # what LeRobot takes an encoder step for [°]
 START = 1_700_000_000_000_000_000  # of a bag [ns]
 
@@ -122,10 +123,9 @@ def unitree(folder: Path, log: Log, storage: str) -> tuple[str, ...]:
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
     store = get_typestore(Stores.ROS2_HUMBLE)
-    store.register(get_types_from_msg("uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 tau\n", "unitree_go/msg/MotorCmd"))
-    store.register(
-        get_types_from_msg("uint8 mode\nfloat32 q\nfloat32 dq\nfloat32 tau_est\n", "unitree_go/msg/MotorState")
-    )
+    motion = "uint8 mode\nfloat32 q\nfloat32 dq\n"
+    store.register(get_types_from_msg(f"{motion}float32 tau\nfloat32 kp\nfloat32 kd\n", "unitree_go/msg/MotorCmd"))
+    store.register(get_types_from_msg(f"{motion}float32 tau_est\n", "unitree_go/msg/MotorState"))
     store.register(get_types_from_msg("unitree_go/MotorCmd[20] motor_cmd\n", "unitree_go/msg/LowCmd"))
     store.register(get_types_from_msg("unitree_go/MotorState[20] motor_state\n", "unitree_go/msg/LowState"))
     speeds = np.gradient(log.position, log.time, axis=0)
@@ -133,11 +133,14 @@ def unitree(folder: Path, log: Log, storage: str) -> tuple[str, ...]:
         kinds = {"/lowcmd": "unitree_go/msg/LowCmd", "/lowstate": "unitree_go/msg/LowState"}
         places = {topic: bag.add_connection(topic, kind, typestore=store) for topic, kind in kinds.items()}
         for at, goals, angles, turning in zip(log.time, log.action, log.position, speeds, strict=True):
-            motors = {"/lowcmd": ("MotorCmd", goals, 0.0 * turning), "/lowstate": ("MotorState", angles, turning)}
-            for topic, (name, here, speed) in motors.items():
+            motors = {
+                "/lowcmd": ("MotorCmd", goals, 0.0 * turning, (0.0, *GAINS)),
+                "/lowstate": ("MotorState", angles, turning, (0.0,)),
+            }
+            for topic, (name, here, speed, rest) in motors.items():
                 motor, q, dq = store.types[f"unitree_go/msg/{name}"], np.zeros(20), np.zeros(20)
                 q[list(MOTORS)], dq[list(MOTORS)] = here, speed
-                message = store.types[kinds[topic]]([motor(1, *motion, 0.0) for motion in zip(q, dq, strict=True)])
+                message = store.types[kinds[topic]]([motor(1, *pair, *rest) for pair in zip(q, dq, strict=True)])
                 bag.write(places[topic], START + round(1e9 * at), store.serialize_cdr(message, kinds[topic]))
     return (f"source={folder / 'bag'}", "mapping=unitree_go2", "~mapping.signals.torque")
 
@@ -239,15 +242,32 @@ FORMATS: Mapping[str, Callable[[Path, Log], tuple[str, ...]]] = {write.__name__:
 
 
 def write(folder: Path, name: str) -> tuple[str, ...]:
-    """Write a format into a folder of its name, and return the words that import it."""
+    """Write a format into a folder of its name, which must be new, and return the words that import it."""
+    log = read_motion() if FORMATS[name] in MOTION else read_chirp()
     (folder / name).mkdir(parents=True)
-    return FORMATS[name](folder / name, read_motion() if FORMATS[name] in MOTION else read_chirp())
+    try:
+        return FORMATS[name](folder / name, log)
+    except ModuleNotFoundError:
+        (folder / name).rmdir()  # every writer imports its library before it writes
+        raise
 
 
 def main(words: list[str]) -> None:
-    """Write the formats that are named, or all."""
-    for name in words[1:] or FORMATS:
-        print("gsl import", f"name={name}", *map(shlex.quote, write(Path(words[0] if words else "formats"), name)))
+    """Write the formats that are named, or all; a format whose library is missing is left out, with a line."""
+    folder, *names = words or ["formats"]
+    missing = False
+    for name in names or FORMATS:
+        if name not in FORMATS:
+            sys.exit(f"there is no format {name}; there is {', '.join(FORMATS)}")
+        try:
+            print("gsl import", f"name={name}", *map(shlex.quote, write(Path(folder), name)), flush=True)
+        except FileExistsError:
+            sys.exit(f"{Path(folder, name)} exists; move it, or name another folder")
+        except ModuleNotFoundError as error:
+            missing = True
+            extra = "hdf5" if name == "hdf5" else "ros"
+            print(f"{name} is left out: {error.name} is missing, pip install 'gsl[{extra}]'", file=sys.stderr)
+    sys.exit(1 if missing else 0)
 
 
 if __name__ == "__main__":

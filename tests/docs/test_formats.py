@@ -6,6 +6,7 @@ import importlib.util
 import re
 import runpy
 import shlex
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -42,3 +43,17 @@ def test_a_log_comes_back_from_every_format(tmp_path: Path, monkeypatch: pytest.
     np.testing.assert_allclose(episode.time, log.time - log.time[0], atol=1e-6)
     np.testing.assert_allclose(episode.position, log.position, atol=1e-14)
     np.testing.assert_allclose(episode.action, log.action[:-1], atol=1e-14)
+
+
+def test_the_script_leaves_out_what_lacks_its_library_and_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = str(tmp_path / "formats")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(SystemExit, match="1"):
+        SCRIPT["main"]([folder, "hdf5", "csv"])
+    out, err = capsys.readouterr()
+    assert "name=csv" in out and "hdf5 is left out" in err and "pip install 'gsl[hdf5]'" in err
+    assert not (tmp_path / "formats/hdf5").exists()  # so that it can be written once the library is there
+    with pytest.raises(SystemExit, match="exists; move it"):
+        SCRIPT["main"]([folder, "csv"])
