@@ -11,7 +11,7 @@ HELD = ("kp", "kd", "limit", "coulomb", "viscous", "armature", "delay")
 REMARKS = {"no_load_speed": "DCMotorCfg has such a line, by saturation_effort and velocity_limit, but no delay"}
 _HEAD = '''"""{robot} in Isaac Lab: ArticulationCfg(actuators=ACTUATORS). Physics steps: {step:g} s.
 
-Frictions are efforts [N·m], as in Isaac Lab 2.2 and later on Isaac Sim 5 and later.{missing}
+Frictions are efforts [N·m], of slides [N], as in Isaac Lab 2.2 and later on Isaac Sim 5 and later.{missing}
 """
 
 from isaaclab.actuators import {kinds}

@@ -11,12 +11,14 @@ import numpy as np
 from gsl.core.plant import Plant
 from gsl.core.servo import numbers
 from gsl.core.servo_law import LAG, LAGS, NOBODY, SIGN, SPEED_UNIT
+from gsl.core.slides import unit_of_slide
 from gsl.errors import ConfigError
 from gsl.export.parts import Export, Simulator, by_joint, unheld
 from gsl.storage.documents import pretty
 from gsl.worlds.servo import BRISTLE
 
 OPSET = 17
+_ANGLE, _SPEED, _TORQUE = (f"[{unit}], of slides [{unit_of_slide(unit)}]" for unit in ("rad", "rad/s", "N·m"))
 _REFERENCE = '''"""The servos of {robot} at one physics step, as gsl simulates them. Arrays have an entry a joint."""
 
 import json
@@ -30,7 +32,7 @@ N = {{key: np.array([values[name] for name in NUMBERS["order"]]) for key, values
 
 
 def torque(targets, q, v, bristle, dahl, step):
-    """targets: what was commanded 0, {lag:g}, ... {last:g} s before (now - delay) [rad], shape ({lags}, n)."""
+    """targets: what was commanded 0, {lag:g}, ... {last:g} s before (now - delay) [rad], [m], shape ({lags}, n)."""
     errors = targets + N["offset"] - q
     bristle[:] = np.clip(bristle + v * step, -N["bristle"], N["bristle"])
     dahl[:] = np.clip(dahl + v * step, -N["bristle"], N["bristle"])
@@ -61,8 +63,9 @@ def export_servo(simulator: Simulator) -> Export:
     about = {
         "robot": plant.robot.name,
         "order": list(plant.robot.motors),
-        "inputs": {"errors": f"(1, n, {LAGS}) [rad]", "velocity": "(1, n) [rad/s]", "bristle": "(1, n) [rad]"},
-        "outputs": {"drive": "before the torque limit (1, n) [N·m]", "output": "behind it (1, n) [N·m]"},
+        "slides": list(plant.robot.slides),  # of these m stands for rad, N for N·m
+        "inputs": {"errors": f"(1, n, {LAGS}) {_ANGLE}", "velocity": f"(1, n) {_SPEED}", "bristle": f"(1, n) {_ANGLE}"},
+        "outputs": {"drive": f"before the torque limit (1, n) {_TORQUE}", "output": f"behind it (1, n) {_TORQUE}"},
         "lag": LAG,
         "joints": joints,
     }
@@ -76,7 +79,8 @@ def export_servo(simulator: Simulator) -> Export:
     try:
         files[f"{name}_servo.onnx"] = _onnx(module, len(plant.robot.motors))
     except ImportError as error:
-        missing.append(f"the ONNX file, which needs gsl[onnx]: pip install 'gsl[onnx]' ({error})")
+        advice = "pip install 'gsl[onnx]', and export under another name="  # under this one it is there, unchanged
+        missing.append(f"the ONNX file, which needs gsl[onnx]: {advice} ({error})")
     return Export(files, missing)
 
 

@@ -177,9 +177,8 @@ def describe_choice(metrics: Mapping[str, Any], unit: Unit) -> str:
     bounds = unit.interval(gain["interval"], sign=True)
     values = f"{unit.format(after['value'])}, {unit.describe_ends(after)}; π0 {unit.format(before['value'])}"
     worth = f"on fresh episodes {values}; gain {unit.format(gain['value'], sign=True)}, 95 % interval {bounds}"
-    doubt = (
-        "" if gain["interval"][0] > 0.0 else ", which is not significant" if gain["value"] > 0.0 else ": worse than π0"
-    )
+    below = ": worse than π0" if gain["interval"][1] < 0.0 else ": no better than π0"
+    doubt = "" if gain["interval"][0] > 0.0 else ", which is not significant" if gain["value"] > 0.0 else below
     return f"{metrics['best']} is returned: {worth}{doubt}; {spent}"
 
 

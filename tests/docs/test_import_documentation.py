@@ -93,3 +93,5 @@ def test_topics_of_a_bag_are_joined_by_time_and_joints_go_by_name(tmp_path: Path
     (tmp_path / "bag.yaml").write_text(blocks("yaml")[1].replace("/commands", "/cmds"))
     line = refused("import", "source=bag", "mapping=bag.yaml", folder=tmp_path)
     assert line == "bag: has no topic /cmds; its topics are /commands, /joint_states"
+    line = refused("import", "source=bag", folder=tmp_path)
+    assert "needs a mapping that says file: TOPIC; its topics are /commands, /joint_states" in line

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import runpy
+import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -240,7 +241,12 @@ def test_the_reference_of_a_learned_servo_is_short_and_gives_the_kernels_torque(
     assert (0 < len(body.slides) < len(body.motors)) == slides
     plant = apply_all(nominal(body), build({"coulomb_friction": {"torque": 0.05}}))
     plant = replace(plant, law=some_law(plant))
-    for name, data in export_servo(Simulator(plant, STEP, PERIOD, False, "arm")).files.items():
+    monkeypatch.setitem(sys.modules, "onnx", None)
+    export = export_servo(Simulator(plant, STEP, PERIOD, False, "arm"))
+    assert "another name=" in next(line for line in export.missing if "gsl[onnx]" in line)  # the same is unchanged
+    document = json.loads(str(export.files["arm_servo.json"]))
+    assert document["slides"] == list(body.slides) and "of slides [m]" in document["inputs"]["errors"]
+    for name, data in export.files.items():
         (tmp_path / name).write_bytes(data if isinstance(data, bytes) else data.encode())
     monkeypatch.chdir(tmp_path)
     text = (tmp_path / "arm_servo_reference.py").read_text(encoding="utf-8")

@@ -43,7 +43,8 @@ def evaluation(*figures: float) -> Artifact:
 @pytest.mark.parametrize(
     ("figures", "end"),
     [
-        ((-6.0, -23.3, -35.0, 0.3), "95 % interval -35.0 to +0.3: worse than π0; 30 real episodes"),
+        ((-6.0, -23.3, -35.0, 0.3), "95 % interval -35.0 to +0.3: no better than π0; 30 real episodes"),
+        ((-6.0, -23.3, -35.0, -0.3), "95 % interval -35.0 to -0.3: worse than π0; 30 real episodes"),
         ((-6.0, -4.0, -1.0, 5.0), "95 % interval -1.0 to +5.0, which is not significant; 30 real episodes"),
         ((-6.0, -4.0, 1.0, 3.0), "95 % interval +1.0 to +3.0; 30 real episodes"),
     ],

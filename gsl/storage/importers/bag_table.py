@@ -58,7 +58,8 @@ class BagTable:
                 chosen = [connection for connection in bag.connections if connection.topic == self.topic]
                 if not chosen:
                     there = ", ".join(sorted({connection.topic for connection in bag.connections})) or "none"
-                    raise TrajectoryError(self.path, f"has no topic {self.topic or '(none)'}; its topics are {there}")
+                    problem = f"has no topic {self.topic}" if self.topic else "needs a mapping that says file: TOPIC"
+                    raise TrajectoryError(self.path, f"{problem}; its topics are {there}")
                 for connection in chosen:
                     if connection.msgtype not in bag.typestore.fielddefs:
                         raise TrajectoryError(self.path, _explain_no_definition(connection.msgtype))
