@@ -111,10 +111,7 @@ def execute(
 
     with console.at_work(command):
         stage, settings, own = prepare(config, trust)
-        for role, part in vars(stage).items():
-            if hasattr(part, "effects") and hasattr(part, "plant"):
-                for line in list_unusual(part.effects, part.plant.robot):
-                    console.status(f"warning: {role}.{line}")
+        _warn(stage, console)
         if getattr(stage, "only_looks", False):
             return dict(stage.look(console))
         out = own.folder(command, level)
@@ -169,6 +166,14 @@ def resolve(composition: Composition) -> dict[str, Any]:
         raise resolution_error(error) from error
     assert isinstance(container, dict)
     return {str(key): value for key, value in container.items()}
+
+
+def _warn(stage: Any, console: Console) -> None:
+    """Say which effects of its worlds have values far from what is documented."""
+    for role, part in vars(stage).items():
+        if hasattr(part, "effects") and hasattr(part, "plant"):
+            for unusual in list_unusual(part.effects, part.plant.robot):
+                console.status(f"warning: {role}.{unusual}")
 
 
 def _name_setting(error: ArtifactError, settings: Mapping[str, Any], name: str) -> Exception:

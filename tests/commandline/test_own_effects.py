@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import pickle
 import re
 import subprocess
@@ -99,6 +100,8 @@ def test_a_value_far_from_its_documented_range_is_a_warning(effect: str, home: P
     words = (*OWN, *QUICK, "world=nao_ideal", f"world.effects.{effect}", "name=far", "force=true")
     line = f"warning: world.effects.{NAME}.thickness = 5: far from its documented range, 0 to 1\n"
     assert (line in done("collect", *words, folder=home).err) == effect.endswith("=5")
+    manifest = json.loads(next((home / "runs/far").glob("*/manifest.json")).read_text())
+    assert manifest["command"].endswith(f"world.effects.{effect} name=far force=true")
 
 
 @pytest.mark.parametrize("name", sorted(list_worlds() - {"gymnasium", "learned", "urdf"}))
