@@ -14,7 +14,7 @@ from functools import cached_property
 from typing import Annotated, Any
 
 from gsl.commandline.words import read_span
-from gsl.core.configuration import name_world
+from gsl.commandline.world_names import name_world
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError, ConfigError

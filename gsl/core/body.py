@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -159,6 +159,30 @@ class Robot:
     def drive(self) -> np.ndarray:
         """For each motor the index of the action that drives it, shape (n_motors,)."""
         return np.array([self.controlled.index(self.coupled.get(name, name)) for name in self.motors])
+
+    def mask(self, joints: str | Sequence[str]) -> np.ndarray:
+        """Return which motors a scope names, shape (n_motors,): `all`, a group of the robot, joint names or a mix.
+
+        Raises:
+            KeyError: with the name that is neither a group nor a motor.
+        """
+        names: set[str] = set()
+        for word in (joints,) if isinstance(joints, str) else joints:
+            names |= set(self._members(word))
+        return np.array([motor in names for motor in self.motors])
+
+    def list_controlled(self, joints: str | Sequence[str]) -> list[str]:
+        """Return the controlled joints that a scope names, see `mask`."""
+        return [name for name, acts in zip(self.controlled, self.mask(joints), strict=False) if acts]
+
+    def _members(self, word: str) -> Sequence[str]:
+        if word == "all":
+            return self.motors
+        if word in self.groups:
+            return self.groups[word]
+        if word in self.motors:
+            return (word, *(motor for motor, driver in self.coupled.items() if driver == word))
+        raise KeyError(word)
 
     @property
     def mass(self) -> float:

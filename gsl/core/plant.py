@@ -90,24 +90,8 @@ class Plant:
     hook: Hook | None = None
 
     def mask(self, joints: str | Sequence[str]) -> np.ndarray:
-        """Return which motors a scope names, shape (n_motors,): `all`, a group of the robot, joint names or a mix.
-
-        Raises:
-            KeyError: with the name that is neither a group nor a motor.
-        """
-        names: set[str] = set()
-        for word in (joints,) if isinstance(joints, str) else joints:
-            names |= set(self._members(word))
-        return np.array([motor in names for motor in self.robot.motors])
-
-    def _members(self, word: str) -> Sequence[str]:
-        if word == "all":
-            return self.robot.motors
-        if word in self.robot.groups:
-            return self.robot.groups[word]
-        if word in self.robot.motors:
-            return (word, *(motor for motor, driver in self.robot.coupled.items() if driver == word))
-        raise KeyError(word)
+        """Return which motors a scope names, see `Robot.mask`."""
+        return self.robot.mask(joints)
 
     def with_servo(self, **numbers: np.ndarray) -> Plant:
         """Return the plant with other numbers of the servos."""

@@ -151,11 +151,11 @@ def _describe(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting:
         _first(extra.get("lower"), _bound(field, "ge"), _bound(field, "gt")),
         _first(extra.get("upper"), _bound(field, "le"), _bound(field, "lt")),
         _bound(field, "le"),
-        any(map(_is_named, (field.annotation, *get_args(field.annotation)))),
+        any(map(_maps_names, (field.annotation, *get_args(field.annotation)))),
     )
 
 
-def _is_named(kind: Any) -> bool:
+def _maps_names(kind: Any) -> bool:
     """Whether it is a mapping by names, and not one of components, each of which says its class."""
     return get_origin(kind) in (Mapping, dict) and not getattr(get_args(kind)[1], "_is_protocol", False)
 

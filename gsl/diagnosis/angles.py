@@ -58,16 +58,14 @@ def effects_in_metres(effects: Mapping[str, Any], robot: Robot) -> dict[str, Any
         effects: A world's `effects:` mapping, for the robot in angles.
         robot: In angles.
     """
+    if not robot.slides:
+        return {**effects}
     return _effects_in_units(effects, robot, dict(zip(robot.motors, (1.0 / levers(robot)).tolist(), strict=True)))
 
 
 def _effects_in_units(effects: Mapping[str, Any], robot: Robot, ratio: Mapping[str, float]) -> dict[str, Any]:
     """Return effects in units of position that are so many times as long, by motor."""
-    return (
-        {name: _entries(name, entries, robot, ratio) for name, entries in effects.items()}
-        if robot.slides
-        else {**effects}
-    )
+    return {name: _entries(name, entries, robot, ratio) for name, entries in effects.items()}
 
 
 def _entries(name: str, entries: Any, robot: Robot, ratio: Mapping[str, float]) -> list[Any]:
@@ -76,7 +74,7 @@ def _entries(name: str, entries: Any, robot: Robot, ratio: Mapping[str, float]) 
     for entry in entries if isinstance(entries, list | tuple) else [entries]:
         settings = settings_of(effect_class(name))
         powers = {key: exponent for key in entry if key in settings and (exponent := power(settings[key].unit))}
-        joints = list_scope(robot, entry.get("joints", "all")) if "joints" in settings and powers else []
+        joints = robot.list_controlled(entry.get("joints", "all")) if "joints" in settings and powers else []
         shares = sorted({ratio[joint] for joint in joints}, reverse=True)
         if shares in ([], [1.0]):
             result.append(entry)
@@ -87,13 +85,6 @@ def _entries(name: str, entries: Any, robot: Robot, ratio: Mapping[str, float]) 
             scaled = {key: entry[key] * share**exponent for key, exponent in powers.items()}
             result.append({**entry, **scaled, "joints": scope})
     return result
-
-
-def list_scope(robot: Robot, scope: str | Sequence[str]) -> list[str]:
-    """Return the controlled joints that a scope names."""
-    words = [scope] if isinstance(scope, str) else list(scope)
-    named = {joint for word in words for joint in robot.groups.get(word, robot.motors if word == "all" else (word,))}
-    return [joint for joint in robot.controlled if joint in named]
 
 
 def say(robot: Robot, joints: Sequence[str], unit: str) -> tuple[float, str]:

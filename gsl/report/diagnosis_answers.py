@@ -9,7 +9,7 @@ from gsl.report.diagnosis_next import Step, steps
 from gsl.report.diagnosis_verdict import (
     cause_name,
     comparison_sentence,
-    list_undecided,
+    list_open_groups,
     nearest,
     shrinkage_sentence,
     sureness,
@@ -42,7 +42,7 @@ def _aside(document: Document) -> Markup | None:
 
 def _cause(document: Document) -> Markup:
     causes = [_one(cause) for cause in entries(document, "causes")]
-    groups = list_undecided(document)
+    groups = list_open_groups(document)
     if causes or groups:
         return join(*causes, bullets(groups))
     return element("p", prose(_nothing(document)))

@@ -13,7 +13,7 @@ from gsl.report.diagnosis_verdict import (
     cause_name,
     comparison_sentence,
     headline,
-    list_undecided,
+    list_open_groups,
     nearest,
     places,
     shrinkage_sentence,
@@ -59,7 +59,7 @@ def _causes(document: Document) -> Table:
         return Table(headline(document), ("", ""), [*alike, *_shrinkage(document)], said)
     columns = ("cause", "parameter", "value", "95 % interval", "probability", "of the rest, back without it")
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
-    lines = "\n".join([*more, *filter(None, [said]), *list_undecided(document)])
+    lines = "\n".join([*more, *filter(None, [said]), *list_open_groups(document)])
     return Table(headline(document), columns, rows[:CAUSES], lines or None)
 
 

@@ -69,7 +69,7 @@ def summary(document: Document) -> str:
     return "" if verdict(document) in ("inseparable", "unknown") else str(document.get("summary") or "")
 
 
-def list_undecided(document: Document) -> list[str]:
+def list_open_groups(document: Document) -> list[str]:
     """Return the groups of effects that cannot be told apart and that stand in no headline above a list of causes."""
     groups = entries(document, "inseparable")[GROUPS if entries(document, "causes") else 0 :]
     return [f"{alternatives(group)}: this log cannot tell which" for group in groups]

@@ -90,7 +90,7 @@ class TrainServo:
             threads=threads(self.workers), members=self.members, walks=walked,
         )  # fmt: skip
         console.phase("measuring what the servo leaves unexplained")
-        noise = self._measure_unexplained(exp, learned.model, plant)
+        noise = self._measure_rest(exp, learned.model, plant)
         model, *further = (
             replace(servo, noise=noise).in_metres(plant, self.sim.plant)
             for servo in (learned.model, *(member.model for member in learned.further))
@@ -125,7 +125,7 @@ class TrainServo:
             raise InputError(f"{self.walks}: has another control period, {rates}; resample one of them")
         return walks(batch, exp.robot, self.sim.plant, self.sim.step, threads(self.workers))
 
-    def _measure_unexplained(self, exp: Log, model: ServoModel, plant: Plant) -> np.ndarray:
+    def _measure_rest(self, exp: Log, model: ServoModel, plant: Plant) -> np.ndarray:
         """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (n, 2)."""
         group = neutral(plant, np.random.default_rng(0)).group  # of those that keep their servo, too
         groups = {name: group[: len(exp.joints)] == g for g, name in enumerate(model.groups)}

@@ -15,7 +15,7 @@ import numpy as np
 
 from gsl.core.body import Robot, carrier, lump
 from gsl.core.setting import Setting, settings_of
-from gsl.diagnosis.angles import list_scope, say
+from gsl.diagnosis.angles import say
 from gsl.diagnosis.settings import GridSettings
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.effects.effect import effect_class, list_documented, names
@@ -95,10 +95,13 @@ class Candidate:
         """Where it acts, in a word."""
         return str(self.fixed.get("joints", self.fixed.get("link", "")))
 
+    def joints(self, robot: Robot) -> list[str]:
+        """Return the controlled joints where it acts, none if that is elsewhere."""
+        return robot.list_controlled(self.fixed["joints"]) if self.on_joints else []
+
     def say(self, robot: Robot) -> list[tuple[float, str]]:
         """Return what takes each free parameter to what a reader is told, and its unit, see `angles.say`."""
-        settings = settings_of(effect_class(self.effect))
-        joints = list_scope(robot, self.scope) if self.on_joints else []
+        settings, joints = settings_of(effect_class(self.effect)), self.joints(robot)
         return [say(robot, joints, settings[name].unit) for name in self.free]
 
     def tell(self, robot: Robot, values: np.ndarray) -> np.ndarray:

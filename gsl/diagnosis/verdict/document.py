@@ -10,7 +10,6 @@ import numpy as np
 
 from gsl.core.body import Robot
 from gsl.core.slides import levers
-from gsl.diagnosis.angles import list_scope
 from gsl.diagnosis.hypothesis.candidates import Candidate
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
 from gsl.diagnosis.log.log import Log
@@ -130,7 +129,7 @@ def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
     return {
         "effect": candidate.effect,
         "kind": effect_class(candidate.effect).kind,
-        "joints": _joints(findings.log.robot, candidate),
+        "joints": candidate.joints(findings.log.robot),
         "scope": candidate.scope,
         "fixed": {key: value for key, value in candidate.fixed.items() if key != "joints"},
         "parameters": _parameters(findings.log.robot, candidate, values, interval),
@@ -139,12 +138,6 @@ def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
         "confused": None if sure else describe_confusion(candidate.effect),
     }
-
-
-def _joints(robot: Robot, candidate: Candidate) -> list[str]:
-    if not candidate.on_joints:
-        return []
-    return list_scope(robot, candidate.scope)
 
 
 def _parameters(robot: Robot, candidate: Candidate, values: np.ndarray, interval: np.ndarray) -> dict[str, Any]:
