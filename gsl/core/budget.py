@@ -12,6 +12,7 @@ import math
 import os
 import signal
 import stat
+import sys
 import threading
 import time
 from collections.abc import Iterable, Iterator
@@ -204,13 +205,19 @@ def within(what: str, seconds: float = SECONDS, growth: float = GROWTH) -> Itera
         if _resident() - before > growth:
             raise InputError(f"{what} takes more than {growth / 1e9:g} GB of memory; it is given up")
 
-    old = signal.signal(signal.SIGPROF, look)
+    def skip(unraisable: sys.UnraisableHookArgs) -> None:
+        if not isinstance(unraisable.exc_value, InputError):
+            shown(unraisable)
+
+    old, shown = signal.signal(signal.SIGPROF, look), sys.unraisablehook
+    sys.unraisablehook = skip  # a finaliser swallows what is raised in it; the next tick raises again
     signal.setitimer(signal.ITIMER_PROF, _TICK, _TICK)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, old)
+        sys.unraisablehook = shown
 
 
 def _resident() -> float:
