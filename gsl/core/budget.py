@@ -139,8 +139,8 @@ def read_text(path: Path, most: float = TEXT_BYTES) -> str:
         InputError: It cannot be read, is too large, or is no text in UTF-8.
     """
     try:
-        with open_file(path, most) as file:
-            return io.TextIOWrapper(file, encoding="utf-8-sig").read()
+        with open_file(path, most) as file, io.TextIOWrapper(file, encoding="utf-8-sig") as text:
+            return text.read()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from error
     except UnicodeDecodeError as error:
