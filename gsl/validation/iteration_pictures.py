@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.body import Robot, lump
-from gsl.core.interfaces import Grounding, World
+from gsl.core.interfaces import Grounding, Policy, World
 from gsl.core.layout import Layout
 from gsl.core.observation import missing, observations
 from gsl.core.seeds import derive_seed
@@ -18,6 +18,7 @@ from gsl.core.transitions import actions
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import LOADED
 from gsl.grounding.none import NoGrounding
+from gsl.policies.policy import describe_command
 from gsl.report.film import Shot, film
 from gsl.report.footfalls import Walk
 from gsl.report.iteration_page import Seen
@@ -75,7 +76,7 @@ def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory, retu
     if not isinstance(world, BulletWorld) or missing(walk, world.layout):
         return Seen()
     traces = draw_joint(folder, Way(world, NoGrounding()), Way(world, scenario.grounding), walk)
-    _draw_walk(world.plant.robot, Shot("π0", "on the real side", walk, REAL), folder)
+    _draw_walk(world.plant.robot, Shot("π0", "on the real side", walk, REAL), scenario.policy, folder)
     simulated = [
         read_footfalls(f"{name} in the grounded simulator", _walk(scenario, parameters, seed))
         for name, parameters in (("π0", scenario.policy.initial), ("the returned policy", returned))
@@ -111,7 +112,8 @@ def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parame
         walk = _walk(scenario, these, seed)
         walks.append(read_footfalls(f"{name} in the grounded simulator", walk))
     if not missing(walk, grounded.layout):
-        _draw_walk(robot, Shot("returned policy", "in the grounded simulator", walk, GROUNDED), folder)
+        shot = Shot("returned policy", "in the grounded simulator", walk, GROUNDED)
+        _draw_walk(robot, shot, scenario.policy, folder)
     caption = "A real motion in the air that nothing was learned from; both simulators play its commands."
     return Seen(traces, [walk for walk in walks if walk], caption)
 
@@ -123,8 +125,8 @@ def _walk(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
     return walk
 
 
-def _draw_walk(robot: Robot, shot: Shot, folder: Path) -> None:
-    film(robot, robot.controlled, [shot], folder / WALK)
+def _draw_walk(robot: Robot, shot: Shot, policy: Policy, folder: Path) -> None:
+    film(robot, robot.controlled, [shot._replace(about=", ".join(describe_command(policy)))], folder / WALK)
 
 
 def read_footfalls(label: str, walk: Trajectory) -> Walk | None:

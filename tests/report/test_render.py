@@ -15,6 +15,7 @@ from gsl.commandline.robot_files import write_robot
 from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError, InputError
 from gsl.grounding.none import NoGrounding
+from gsl.policies.policy import describe_command
 from gsl.policies.walk_engine import WalkEngine
 from gsl.report.console import Console
 from gsl.report.film import RATE, SHEET, WIDTH, Shot, check_format, film
@@ -46,6 +47,11 @@ def orange(image: np.ndarray) -> np.ndarray:
 
 
 def sheet(shots: list[Shot], path: Path) -> np.ndarray:
+    """The moments, without the traces below."""
+    return whole_sheet(shots, path)[:-HEIGHT]
+
+
+def whole_sheet(shots: list[Shot], path: Path) -> np.ndarray:
     film(nao(), nao().controlled, shots, path)
     return np.asarray(Image.open(path).convert("RGB"))
 
@@ -94,6 +100,16 @@ def test_two_sides_stand_beside_each_other(walk, tmp_path: Path) -> None:
     assert both.shape[0] == 2 * alone.shape[0]
     left, right = np.split(both, 2, axis=1)
     np.testing.assert_array_equal(left, right)
+
+
+def test_a_sheet_marks_the_command_over_time_and_says_the_conditions(walk, tmp_path: Path) -> None:
+    plain = whole_sheet([Shot("a", "", walk, RED)], tmp_path / "plain.png")
+    told = whole_sheet([Shot("a", "", walk, RED, "nao_worn, forward 1 m/s, seed 1")], tmp_path / "told.png")
+    marks = (plain[-HEIGHT:] == 0).all(axis=(0, 2))
+    assert np.count_nonzero(marks) == SHEET and np.ptp(np.diff(np.flatnonzero(marks))) <= 1
+    differs = np.split((plain != told).any(axis=2)[:-HEIGHT], SHEET // 2)
+    assert all(part[:40].any() and not part[40:].any() for part in differs), "once a moment, above the robot"
+    assert describe_command(WalkEngine(left=-0.1)) == ["walk_engine", "forward 1 m/s", "left -0.1 m/s"]
 
 
 def test_a_fall_is_marked_when_it_happens(walk, tmp_path: Path) -> None:
