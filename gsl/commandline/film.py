@@ -168,7 +168,9 @@ def _walk(folder: Path, kind: str, settings: Subject, trust: Sequence[str], cons
     robot = _robot_in(sides[0][1].world)
     parameters, seed = vector(stage.policy, policy), derive_seed(settings.seed, "film")
     shots = tuple(
-        Shot(policy.name, where, _roll_out(scenario, parameters, seed), colour, _describe(world, stage.policy, settings))
+        Shot(
+            policy.name, where, _roll_out(scenario, parameters, seed), colour, _describe(world, stage.policy, settings)
+        )
         for where, scenario, colour, world in sides
     )
     return Cast(robot, robot.controlled, shots)
