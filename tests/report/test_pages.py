@@ -283,6 +283,12 @@ def test_charts_tell_their_labels_and_values() -> None:
     assert {"diagnosed", "real", "sim"} <= {*words(str(pairs)).split()}
 
 
+def test_a_column_without_a_value_is_left_out() -> None:
+    rows = [("gat", "", "0.5", None), ("none", "", "", None)]
+    assert words(table(("grounding", "drift", "promise", "rank"), rows)) == "grounding promise gat 0.5 none"
+    assert words(table(("grounding", "drift"), [])) == "grounding drift"
+
+
 def test_text_is_escaped_once_and_markup_never() -> None:
     assert element("td", "a < b", element("b", "&")) == "<td>a &lt; b<b>&amp;</b></td>"
     assert element("p", kind="a", style='"') == '<p class="a" style="&#34;"></p>'
