@@ -10,11 +10,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from gsl.commandline.own_word import find_own_modules, find_trust
-from gsl.commandline.rebuild import rebuild
+from gsl.commandline.rebuild import rebuild, rebuild_search
 from gsl.commandline.words import split_words
 from gsl.commandline.world_names import name_world
 from gsl.core.body import Robot
-from gsl.core.interfaces import REAL, SIM, Policy
+from gsl.core.interfaces import REAL, Policy
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
@@ -22,7 +22,6 @@ from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import did_you_mean, make
 from gsl.errors import ArtifactError, ConfigError, InputError
 from gsl.grounding.none import NoGrounding
-from gsl.grounding.preparation import without_margins
 from gsl.policies.policy import describe_command
 from gsl.report.console import Console
 from gsl.report.film import Shot, check_format, film
@@ -33,7 +32,7 @@ from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import PolicyRecord
-from gsl.storage.policy_choice import FILE, records, vector
+from gsl.storage.policy_choice import FILE, find_search, records, vector
 from gsl.storage.references import RUNS, resolve, resolve_main
 from gsl.storage.trajectories import data_file, read
 from gsl.storage.whole import explain_refusal, replacing
@@ -158,11 +157,10 @@ def _walk(folder: Path, kind: str, settings: Subject, trust: Sequence[str], cons
         scenario = Scenario(stage.world, stage.task, stage.policy, REAL, NoGrounding()).prepare()
         sides.append(("on the real side", scenario, REAL_COLOUR, config["world"]))
     if searched:
-        search, config = rebuild(searched, trust)
-        scenario = Scenario(search.world, search.task, search.policy, SIM, without_margins(search.grounding))
-        plain = isinstance(search.grounding, NoGrounding)
-        where, colour = ("in simulation", SIMULATION) if plain else ("in the grounded simulator", GROUNDED)
-        sides.append((where, scenario.prepare(searched.metrics), colour, config["world"]))
+        plain, scenario = rebuild_search(searched, trust)
+        bare = isinstance(plain.grounding, NoGrounding)
+        where, colour = ("in simulation", SIMULATION) if bare else ("in the grounded simulator", GROUNDED)
+        sides.append((where, scenario, colour, searched.config["world"]))
     if not sides:
         raise ArtifactError(folder, "its robot is elsewhere, and its policies are of no search; render a log instead")
     robot = _robot_in(sides[0][1].world)
@@ -199,12 +197,8 @@ def _last_evaluation(folder: Path) -> Path:
 
 def _search_of(measured: Artifact) -> Artifact | None:
     """Return the search whose policies were measured, if they are of one."""
-    for parent in measured.manifest.parents:
-        place = measured.folder / parent.path
-        home = place if place.is_dir() else place.parent
-        if parent.role == "policies" and (home / manifest.NAME).is_file() and manifest.read(home).kind == "optimize":
-            return _open(home)
-    return None
+    places = [measured.folder / parent.path for parent in measured.manifest.parents if parent.role == "policies"]
+    return next(filter(None, map(find_search, places)), None)
 
 
 def _choose(stored: Sequence[PolicyRecord], name: str) -> PolicyRecord:

@@ -13,12 +13,20 @@ from gsl.core.described import describe
 from gsl.core.interfaces import Policy
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
 from gsl.storage.identity import flat
 from gsl.storage.policies import Policies, PolicyRecord, read_policies
 from gsl.storage.references import resolve
 
 FILE = "policies.json"
 EVALUATION = "evaluation.json"  # of policies that were measured
+
+
+def find_search(place: Path) -> Artifact | None:
+    """Return the search of which a folder or file of policies is, None where it is of none."""
+    home = place if place.is_dir() else place.parent
+    made = manifest.read(home) if (home / manifest.NAME).is_file() else None
+    return Artifact(home, made) if made and made.kind == "optimize" else None
 
 
 @dataclass(frozen=True)
