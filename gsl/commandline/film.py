@@ -32,7 +32,7 @@ from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import PolicyRecord
-from gsl.storage.policy_choice import FILE, find_search, records, vector
+from gsl.storage.policy_choice import find_measurement, find_search, records, vector
 from gsl.storage.references import RUNS, resolve, resolve_main
 from gsl.storage.trajectories import data_file, read
 from gsl.storage.whole import explain_refusal, replacing
@@ -145,9 +145,9 @@ def _episode(title: str, batch: Batch, number: int) -> Trajectory:
 
 def _walk(folder: Path, kind: str, settings: Subject, trust: Sequence[str], console: Console) -> Cast:
     """Return walks of a policy that a search found: on the real side, and in the simulator of the search."""
-    measured = _open(_last_evaluation(folder) if kind == "iterate" else folder)
+    measured = _open(find_measurement(folder) if kind == "iterate" else folder)
     stage, config = rebuild(measured, trust)
-    searched = measured if kind == "optimize" else _search_of(measured)
+    searched = measured if kind == "optimize" else find_search(measured.folder)
     source = measured.folder if not settings.policy else searched.folder if searched else resolve(stage.policies)
     policy = _choose(records(stage.policy, str(source)), settings.policy)
     sides = []
@@ -182,23 +182,6 @@ def _describe(world: Mapping[str, Any], policy: Policy, settings: Subject) -> st
 
 def _open(folder: Path) -> Artifact:
     return Artifact(folder, manifest.read(folder))
-
-
-def _last_evaluation(folder: Path) -> Path:
-    """Return the measurement whose policy a run returned, the last one otherwise."""
-    places = [folder / link.path for link in _open(folder).manifest.links if link.role == "evaluate"]
-    grounded = [place for place in places if place.name == "evaluate"] or places
-    if not grounded:
-        raise ArtifactError(folder, "has measured no policy that could be shown")
-    returned = (folder / FILE).read_bytes()
-    same = [place for place in grounded if (place / FILE).is_file() and (place / FILE).read_bytes() == returned]
-    return (same or grounded)[-1]
-
-
-def _search_of(measured: Artifact) -> Artifact | None:
-    """Return the search whose policies were measured, if they are of one."""
-    places = [measured.folder / parent.path for parent in measured.manifest.parents if parent.role == "policies"]
-    return next(filter(None, map(find_search, places)), None)
 
 
 def _choose(stored: Sequence[PolicyRecord], name: str) -> PolicyRecord:

@@ -17,6 +17,7 @@ from gsl.report.evaluation_page import Look
 from gsl.report.joint_trace import Traces
 from gsl.report.shown import scale_of
 from gsl.rollout.rollout import Scenario
+from gsl.storage.artifact import Artifact
 from gsl.storage.policy_choice import find_search
 from gsl.validation.gate import REPORT
 from gsl.validation.iteration_pictures import Way, centre, read_footfalls, show_window, trace_joints, walk_once
@@ -36,8 +37,7 @@ def look_at(
         source: Where the policies come from.
         trust: Modules that are not gsl's and whose classes settings may name.
     """
-    body = centre(real.world)
-    searched = find_search(source) if source else None
+    body, searched = centre(real.world), _find(source)
     check = searched.folder / REPORT if searched else None
     if body is None:
         return Look(check=check)
@@ -59,6 +59,13 @@ def look_at(
     long = {name: walk for name, walk in episodes.items() if len(walk) >= SHORTEST}
     traces = {name: _trace(ways, walk, body.layout, slides) for name, walk in long.items()}
     return Look(traces, [step for step in steps if step], check)
+
+
+def _find(source: Path | None) -> Artifact | None:
+    try:
+        return find_search(source) if source else None
+    except GslError:  # what the policies were measured in is gone
+        return None
 
 
 def _trace(ways: Sequence[Way], walk: Trajectory, layout: Layout, slides: Sequence[str]) -> Mapping[str, Traces]:
