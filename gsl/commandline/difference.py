@@ -6,11 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from gsl.core.unit import Unit
 from gsl.errors import ArtifactError
 from gsl.report.account import plain
 from gsl.report.console import Console
 from gsl.report.diagnosis_two import set_side_by_side, table_of_two
 from gsl.report.diagnosis_verdict import verdict
+from gsl.report.headline import show_in_unit, unit_of
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import REPORT, report_of
@@ -48,7 +50,9 @@ def compare(first: str, second: str, console: Console) -> None:
         "metrics": _differ(flat(left.metrics), flat(right.metrics)),
     }
     names = [name_run(each.folder) for each in (left, right)]
-    for title, pairs in parts.items():
+    unit = unit_of(left) if unit_of(left) == unit_of(right) else Unit()  # of different tasks each is as it was measured
+    shown = _differ(*(show_in_unit(flat(each.metrics), unit) for each in (left, right)))
+    for title, pairs in {**parts, "metrics": shown}.items():
         if pairs:
             rows = [
                 (name, *_show(pair), *([_change(pair)] if title == "metrics" else [])) for name, pair in pairs.items()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -10,10 +10,11 @@ from typing import Annotated, Any
 import numpy as np
 
 from gsl.commandline.own_word import find_own_modules, find_trust
-from gsl.commandline.rebuild import rebuild
+from gsl.commandline.rebuild import rebuild, rebuild_search
 from gsl.commandline.words import split_words
+from gsl.commandline.world_names import name_world
 from gsl.core.body import Robot
-from gsl.core.interfaces import REAL, SIM
+from gsl.core.interfaces import REAL, Policy
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
@@ -21,7 +22,7 @@ from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import did_you_mean, make
 from gsl.errors import ArtifactError, ConfigError, InputError
 from gsl.grounding.none import NoGrounding
-from gsl.grounding.preparation import without_margins
+from gsl.policies.policy import describe_command
 from gsl.report.console import Console
 from gsl.report.film import Shot, check_format, film
 from gsl.report.style import GROUNDED, SIMULATION
@@ -31,7 +32,7 @@ from gsl.rollout.rollout import Scenario, rollout
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import PolicyRecord
-from gsl.storage.policy_choice import FILE, records, vector
+from gsl.storage.policy_choice import find_measurement, find_search, records, vector
 from gsl.storage.references import RUNS, resolve, resolve_main
 from gsl.storage.trajectories import data_file, read
 from gsl.storage.whole import explain_refusal, replacing
@@ -130,7 +131,7 @@ def _play_logs(folder: Path, settings: Subject, trust: Sequence[str]) -> Cast:
         logs[settings.beside] = read(data_file(settings.beside), joints=first.joints)
     colours = (REAL_COLOUR, SIMULATION)
     shots = tuple(
-        Shot(title, "", _episode(title, batch, settings.episode), colour)
+        Shot(title, "", _episode(title, batch, settings.episode), colour, f"episode {settings.episode}")
         for (title, batch), colour in zip(logs.items(), colours, strict=False)
     )
     return Cast(robot, first.joints, shots)
@@ -144,9 +145,9 @@ def _episode(title: str, batch: Batch, number: int) -> Trajectory:
 
 def _walk(folder: Path, kind: str, settings: Subject, trust: Sequence[str], console: Console) -> Cast:
     """Return walks of a policy that a search found: on the real side, and in the simulator of the search."""
-    measured = _open(_last_evaluation(folder) if kind == "iterate" else folder)
-    stage, _ = rebuild(measured, trust)
-    searched = measured if kind == "optimize" else _search_of(measured)
+    measured = _open(find_measurement(folder) if kind == "iterate" else folder)
+    stage, config = rebuild(measured, trust)
+    searched = measured if kind == "optimize" else find_search(measured.folder)
     source = measured.folder if not settings.policy else searched.folder if searched else resolve(stage.policies)
     policy = _choose(records(stage.policy, str(source)), settings.policy)
     sides = []
@@ -154,46 +155,33 @@ def _walk(folder: Path, kind: str, settings: Subject, trust: Sequence[str], cons
         console.status("the robot is not in this computer: the film shows the simulator alone")
     elif kind != "optimize":
         scenario = Scenario(stage.world, stage.task, stage.policy, REAL, NoGrounding()).prepare()
-        sides.append(("on the real side", scenario, REAL_COLOUR))
+        sides.append(("on the real side", scenario, REAL_COLOUR, config["world"]))
     if searched:
-        search, _ = rebuild(searched, trust)
-        scenario = Scenario(search.world, search.task, search.policy, SIM, without_margins(search.grounding))
-        plain = isinstance(search.grounding, NoGrounding)
-        where, colour = ("in simulation", SIMULATION) if plain else ("in the grounded simulator", GROUNDED)
-        sides.append((where, scenario.prepare(searched.metrics), colour))
+        plain, scenario = rebuild_search(searched, trust)
+        bare = isinstance(plain.grounding, NoGrounding)
+        where, colour = ("in simulation", SIMULATION) if bare else ("in the grounded simulator", GROUNDED)
+        sides.append((where, scenario, colour, searched.config["world"]))
     if not sides:
         raise ArtifactError(folder, "its robot is elsewhere, and its policies are of no search; render a log instead")
     robot = _robot_in(sides[0][1].world)
     parameters, seed = vector(stage.policy, policy), derive_seed(settings.seed, "film")
     shots = tuple(
-        Shot(policy.name, where, _roll_out(scenario, parameters, seed), colour) for where, scenario, colour in sides
+        Shot(
+            policy.name, where, _roll_out(scenario, parameters, seed), colour, _describe(world, stage.policy, settings)
+        )
+        for where, scenario, colour, world in sides
     )
     return Cast(robot, robot.controlled, shots)
 
 
+def _describe(world: Mapping[str, Any], policy: Policy, settings: Subject) -> str:
+    """Return in which world a policy walks, what it is asked to do, and the seed."""
+    names = " or ".join(sorted(name_world(world)))
+    return ", ".join(filter(None, [names, *describe_command(policy), f"seed {settings.seed}"]))
+
+
 def _open(folder: Path) -> Artifact:
     return Artifact(folder, manifest.read(folder))
-
-
-def _last_evaluation(folder: Path) -> Path:
-    """Return the measurement whose policy a run returned, the last one otherwise."""
-    places = [folder / link.path for link in _open(folder).manifest.links if link.role == "evaluate"]
-    grounded = [place for place in places if place.name == "evaluate"] or places
-    if not grounded:
-        raise ArtifactError(folder, "has measured no policy that could be shown")
-    returned = (folder / FILE).read_bytes()
-    same = [place for place in grounded if (place / FILE).is_file() and (place / FILE).read_bytes() == returned]
-    return (same or grounded)[-1]
-
-
-def _search_of(measured: Artifact) -> Artifact | None:
-    """Return the search whose policies were measured, if they are of one."""
-    for parent in measured.manifest.parents:
-        place = measured.folder / parent.path
-        home = place if place.is_dir() else place.parent
-        if parent.role == "policies" and (home / manifest.NAME).is_file() and manifest.read(home).kind == "optimize":
-            return _open(home)
-    return None
 
 
 def _choose(stored: Sequence[PolicyRecord], name: str) -> PolicyRecord:

@@ -8,7 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from gsl.core.described import restore
+from gsl.core.interfaces import SIM
 from gsl.errors import ArtifactError
+from gsl.grounding.preparation import without_margins
+from gsl.rollout.rollout import Scenario
 from gsl.storage.artifact import CONFIG, Artifact
 from gsl.storage.identity import content_hash
 from gsl.storage.lineage import COPY, REPEAT, absence
@@ -39,6 +42,13 @@ def rebuild(artifact: Artifact, trust: Sequence[str]) -> tuple[Any, dict[str, An
             artifact.folder / CONFIG, "names no stage; it is not as gsl wrote it, build the artifact again"
         )
     return stage, config
+
+
+def rebuild_search(searched: Artifact, trust: Sequence[str]) -> tuple[Scenario, Scenario]:
+    """Return the plain simulator of a search with its grounding, and what both became; errors as those of `rebuild`."""
+    search, _ = rebuild(searched, trust)
+    plain = Scenario(search.world, search.task, search.policy, SIM, without_margins(search.grounding))
+    return plain, plain.prepare(searched.metrics)
 
 
 def _move(settings: Any, role: list[str], source: Path) -> None:

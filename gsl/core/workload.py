@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -61,14 +62,14 @@ class Loop:
 
     def __init__(self, work: Workload, total: int, description: str) -> None:
         self._work, self._total, self._description = work, total, description
-        self._begun: float | None = None  # when its first step was done, whose time is that of compilation
+        self._begun: float | None = None  # when its first step was done, in whose time workers start
         self._done, self._worked, self._falls = 0, 0, 0
 
     def advance(self, steps: int = 1, *, worked: bool = True) -> None:
         """Note that `steps` more are done; without work if they were done before."""
         self._done += steps
         if worked and self._begun is None:
-            self._begun = self._work.clock()
+            self._begun = self._work.worked()
         elif worked:
             self._worked += steps
         self._work.step(steps, worked=worked)
@@ -83,7 +84,7 @@ class Loop:
 
     def words(self) -> list[str]:
         """Return how far it is, and how fast."""
-        passed = 0.0 if self._begun is None else self._work.clock() - self._begun
+        passed = 0.0 if self._begun is None else self._work.worked() - self._begun
         rate = self._worked / passed if passed > 0.0 else 0.0
         speed = f"{rate:.1f} a second" if rate >= 1.0 else f"{1.0 / rate:.1f} s each" if rate else ""
         return [f"{self._description}: {self._done} of {self._total}", speed]
@@ -104,13 +105,24 @@ class Workload:
         self._alone = self._warm = False
         self._share = self._free = self._begun = self._last = 0.0
         self._phase, self._entered = "", 0.0
+        self._looking, self._looked = threading.Lock(), self.clock()
+        self._compiling, self._compiled = False, 0.0
+
+    def worked(self) -> float:
+        """Return the clock without the time in which something was compiled [s], as far as somebody looked."""
+        with self._looking:
+            now, compiling = self.clock(), is_compiling()
+            if compiling or self._compiling:
+                self._compiled += now - self._looked
+            self._looked, self._compiling = now, compiling
+            return now - self._compiled
 
     @contextmanager
     def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:
         """Within, the work, or the present part of the plan around, consists of such parts."""
         if not self._plans:
             self._share = self._free = 0.0
-            self._begun = self._last = self.clock()
+            self._begun = self._last = self.worked()
             self.best, self._warm = "", False
         self._plans.append(Plan(noun, parts))
         try:
@@ -182,7 +194,7 @@ class Workload:
     def left(self) -> float | None:
         """Return how long the rest takes [s], None if that cannot be said yet.
 
-        The first step that was worked does not count: its time is that of compilation, and of workers that start.
+        Compilation does not count, nor does the first step that was worked, in whose time workers start.
         A part that takes longer than planned leaves the time of the parts after it as it is.
         """
         seconds = self._plans[0].seconds if self._plans else 0.0
@@ -191,7 +203,7 @@ class Workload:
         if weight <= 0.0:
             return None
         whole = (self._last - self._begun + prior * seconds) / weight
-        passed = min(self.clock() - self._last, whole * (self._end() - self._share))
+        passed = min(self.worked() - self._last, whole * (self._end() - self._share))
         return max(0.0, whole * (1.0 - self._share) - passed)
 
     def _end(self) -> float:
@@ -203,12 +215,12 @@ class Workload:
 
     def text(self) -> str:
         """Return in a line where the work is, how much is done, how fast it goes and what has come out."""
-        plans, loop, left = [*self._plans], self._loop, self.left()
+        plans, loop, left, compiling = [*self._plans], self._loop, self.left(), is_compiling()
         whole = [f"{100.0 * self._share:.0f} % done"] if plans and plans[0].parts else []
-        whole += [f"about {duration(left)} left"] if left and left >= 0.5 else []  # nobody knows once it is over
+        whole += [f"about {duration(left)} left"] if left and left >= 0.5 and not compiling else []
         phase = [] if loop or not self._phase else [self._phase, duration(self.clock() - self._entered)]
         places = [*(plan.words() for plan in plans if plan.noun), *(loop.words() if loop else phase)]
-        places += [COMPILING] if is_compiling() else []
+        places += [COMPILING] if compiling else []
         outcome = [self.best, loop.falls() if loop else ""] if plans else []
         return "; ".join(filter(None, (", ".join(filter(None, words)) for words in (whole, places, outcome))))
 
@@ -218,7 +230,7 @@ class Workload:
             inside = plan.share(inside)
         moved = max(0.0, inside - self._share)
         self._share += moved
-        self._last = self.clock()
+        self._last = self.worked()
         if not (worked and self._warm):
             self._free += moved
         if worked and not self._warm:

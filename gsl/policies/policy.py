@@ -8,6 +8,7 @@ import numpy as np
 
 from gsl.core.interfaces import Policy, World
 from gsl.core.layout import Layout
+from gsl.core.setting import settings_of
 
 
 @runtime_checkable
@@ -26,3 +27,11 @@ def size(policy: Policy, world: World) -> Policy:
 def neighbour(policy: Policy, parameters: np.ndarray, spread: float, rng: np.random.Generator) -> np.ndarray:
     """Return parameters near others: each moved by a Gaussian of `spread` times its scale."""
     return parameters + spread * policy.scale * rng.standard_normal(len(parameters))
+
+
+def describe_command(policy: Policy) -> list[str]:
+    """Return what a policy is asked to do in words: its family, and each number that has a unit and is not 0."""
+    settings = settings_of(type(policy)).values()
+    numbers = [(item.name, getattr(policy, item.name, None), item.unit) for item in settings if item.unit]
+    asked = [f"{name} {value:g} {unit}" for name, value, unit in numbers if isinstance(value, int | float) and value]
+    return [type(policy).__module__.rpartition(".")[2], *asked]

@@ -276,4 +276,7 @@ def _visible_cells(cells: Sequence[object]) -> list[object]:
 def _rich_console(is_terminal: bool, *, stderr: bool) -> rich.console.Console:
     from rich.console import Console as RichConsole
 
-    return RichConsole(stderr=stderr, width=None if is_terminal else WIDTH_WITHOUT_TERMINAL)
+    # Where no colours are wanted there is no bold either; the live display alone moves the cursor.
+    colours: Any = None if os.environ.get("NO_COLOR") else "auto"
+    width = None if is_terminal else WIDTH_WITHOUT_TERMINAL
+    return RichConsole(stderr=stderr, width=width, color_system=colours)

@@ -2,21 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+from markupsafe import Markup
 
 from gsl.core.unit import Unit
 from gsl.report.account import describe_choice, evaluation_table
+from gsl.report.footfalls import Walk
+from gsl.report.iteration_page import grounding, read_check
+from gsl.report.joint_trace import Traces
 from gsl.report.learning_curve import search
 from gsl.report.parts import section, table
-from gsl.report.run_page import Answer, Change, budget, curves, describe_gain, parameters, write_page
+from gsl.report.run_page import Answer, Change, budget, curves, describe_gain, footfalls, joints, parameters, write_page
 
+_CAPTION = "A fresh episode on the real side, the first with a fall if there was one."
+_REPLAYED = " Simulators start in one of its states and play its actions."
 _PHASES = {"policies": "episodes to choose", "check": "episodes to check", "confirmation": "fresh episodes to report"}
 
 
+class Look(NamedTuple):
+    """What there is to see of the policies that were reported.
+
+    Attributes:
+        traces: Of each policy by joint, the best one first; none where there are no joints.
+        walks: Whose feet are known.
+        check: Where the check of a grounding lies, if the policies are of a search.
+    """
+
+    traces: Mapping[str, Mapping[str, Traces]] = {}
+    walks: Sequence[Walk] = ()
+    check: Path | None = None
+
+
 def write_evaluation_page(
-    folder: Path, metrics: Mapping[str, Any], document: Mapping[str, Any], change: Change, unit: Unit
+    folder: Path, metrics: Mapping[str, Any], document: Mapping[str, Any], change: Change, unit: Unit, look: Look
 ) -> None:
     """Write the page.
 
@@ -26,6 +47,7 @@ def write_evaluation_page(
         document: What evaluation.json holds.
         change: Of the policy, from the first to the best.
         unit: Of the task.
+        look: What there is to see.
     """
     alone, choice = not metrics["policies"], describe_choice(metrics, unit)
     sentence, sure = f"{choice[0].upper()}{choice[1:]}.", alone
@@ -40,7 +62,18 @@ def write_evaluation_page(
     spent = [(words, str(sum(row["episodes"] for row in document[phase]))) for phase, words in _PHASES.items()]
     sections = [
         section("Policies on the real side", table(columns, rows)),
-        *([] if alone else [curves([searched], unit.name), parameters(change)]),
+        None if alone else curves([searched], unit.name),
+        grounding(read_check(look.check) if look.check else None, []),
+        *_draw_joints(look),
+        footfalls(look.walks),
+        None if alone else parameters(change),
         budget([*spent, ("in all", str(metrics["real_episodes"]))]),
     ]
     write_page(folder, answer, sections)
+
+
+def _draw_joints(look: Look) -> Iterator[Markup | None]:
+    """Yield a section a policy; simulators are there where the policies are of a search."""
+    for name, traces in look.traces.items():
+        replayed = any(trace.simulation is not None for trace in traces.values())
+        yield joints(traces, _CAPTION + _REPLAYED * replayed, f"Joint by joint: {name}")

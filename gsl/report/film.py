@@ -32,12 +32,14 @@ class Shot(NamedTuple):
         who, where: Such as "generation_05" and "on the real side".
         trajectory: What is shown.
         colour: Of its curve, "#rrggbb".
+        about: Under which conditions, such as the world, the command and the seed.
     """
 
     who: str
     where: str
     trajectory: Trajectory
     colour: str
+    about: str = ""
 
     @property
     def title(self) -> str:
@@ -82,9 +84,11 @@ def film(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], path: Path,
         )
     scene = Scene.of(robot, [shot.trajectory for shot in shots], WIDTH)
     with closing(Camera(robot)) as camera:
-        strips = [Strip(camera, robot, joints, scene, shot.title, shot.trajectory) for shot in shots]
+        strips = [Strip(camera, robot, joints, scene, shot.title, shot.about, shot.trajectory) for shot in shots]
         if path.suffix == ".png":
-            _save_sheet(strips, moments, path)
+            rows = _draw_sheet(strips, moments)
+            background, place = draw_traces(joints, shots, rows.shape[1], robot.slides)
+            _save_sheet(rows, see(background, *map(place, moments)), path)
             return
         background, place = draw_traces(joints, shots, scene.width * (len(shots) if scene.beside else 1), robot.slides)
         pictures = (
@@ -94,14 +98,18 @@ def film(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], path: Path,
         _save(pictures, path)
 
 
-def _save_sheet(strips: Sequence[Strip], moments: np.ndarray, path: Path) -> None:
-    """Write moments in rows, the strips of one moment side by side."""
-    from PIL import Image
-
+def _draw_sheet(strips: Sequence[Strip], moments: np.ndarray) -> np.ndarray:
+    """Return moments in rows, the strips of one moment side by side."""
     pictures = [np.concatenate([strip.picture(moment) for strip in strips], axis=1) for moment in moments]
     columns = max(1, 2 * WIDTH // pictures[0].shape[1])
     rows = [np.concatenate(pictures[k : k + columns], axis=1) for k in range(0, len(pictures), columns)]
-    Image.fromarray(np.concatenate(rows, axis=0)).save(path)
+    return np.concatenate(rows, axis=0)
+
+
+def _save_sheet(rows: np.ndarray, traces: np.ndarray, path: Path) -> None:
+    from PIL import Image
+
+    Image.fromarray(np.concatenate([rows, traces], axis=0)).save(path)
 
 
 def _save(pictures: Iterator[np.ndarray], path: Path) -> None:

@@ -23,7 +23,8 @@ ROOM = 1.5  # height of a picture in heights of the robot
 WIDEST, FLATTEST = 4.2, 2.0  # width through height: at most; where strips are put below each other
 STEPS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)  # of a ruler [m]
 MARKS = 14  # of a ruler, at most
-LETTERS = 15  # [pixels]
+LETTERS, SMALL = 15, 12  # [pixels]
+PLACE = 150  # of the way and the time at the right [pixels]
 STILL = 0.01  # way of a base that is held [m]
 
 
@@ -79,14 +80,22 @@ class Strip:
         joints: Names of the columns of its positions.
         scene: What is seen of the world.
         title: Who moves and where.
+        about: Under which conditions.
         trajectory: How.
     """
 
     def __init__(
-        self, camera: Camera, robot: Robot, joints: Sequence[str], scene: Scene, title: str, trajectory: Trajectory
+        self,
+        camera: Camera,
+        robot: Robot,
+        joints: Sequence[str],
+        scene: Scene,
+        title: str,
+        about: str,
+        trajectory: Trajectory,
     ) -> None:
         self._camera, self._robot, self._scene = camera, robot, scene
-        self._joints, self._title, self._trajectory = joints, title, trajectory
+        self._joints, self._title, self._about, self._trajectory = joints, title, about, trajectory
         self._places, self._turns = places(trajectory), turns(trajectory)
         self._ruler = camera.project(scene.marks, scene.view, scene.width, scene.height)
         fell = trajectory.fell
@@ -105,6 +114,9 @@ class Strip:
         draw = ImageDraw.Draw(image)
         self._draw_ruler(draw)
         draw.text((10, 6), self._title, fill=INK, font=_font(bold=True))
+        beyond = 10 + draw.textlength(f"{self._title}  ", font=_font(bold=True))
+        beside = beyond + draw.textlength(self._about, font=_font(SMALL)) < scene.width - PLACE
+        draw.text((beyond, 8) if beside else (10, 28), self._about, fill=INK, font=_font(SMALL))
         draw.text((scene.width - 10, 6), self._say(row, moment), fill=INK, font=_font(), anchor="ra")
         if moment >= self._fall:
             draw.text(
@@ -135,10 +147,10 @@ def compose(strips: Sequence[np.ndarray], scene: Scene, traces: np.ndarray) -> n
     return np.concatenate([whole, traces], axis=0)
 
 
-def see(background: np.ndarray, column: float) -> np.ndarray:
-    """Return the traces with a line at the present time, at a column [pixels]."""
+def see(background: np.ndarray, *columns: float) -> np.ndarray:
+    """Return the traces with a line at each time that is shown, at a column [pixels]."""
     shown = background.copy()
-    shown[:, int(np.clip(round(column), 0, background.shape[1] - 1))] = (0, 0, 0)
+    shown[:, np.clip(np.round(columns).astype(int), 0, background.shape[1] - 1)] = (0, 0, 0)
     return shown
 
 
@@ -178,9 +190,9 @@ def _even(number: float) -> int:
 
 
 @cache
-def _font(*, bold: bool = False) -> Any:
+def _font(height: int = LETTERS, *, bold: bool = False) -> Any:
     import matplotlib
     from PIL import ImageFont
 
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
-    return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", name)), LETTERS)
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path(), "fonts", "ttf", name)), height)

@@ -6,17 +6,31 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from gsl.core.unit import Unit, format_gain
-from gsl.core.words import falls, several
+from gsl.core.words import falls, in_unit, several
 from gsl.errors import ArtifactError
 from gsl.grounding.diagnosis_file import name_causes
 from gsl.storage.artifact import Artifact
 
 Metrics = Mapping[str, Any]
+VALUED = ("value", "value_sim", "interval", "returned_value_sim", "best_value_sim", "best_cvar_sim")
+"""Last part of the names of metrics that are values of a task."""
+PROMISED = ("promise", "upper")
 
 
 def unit_of(artifact: Artifact) -> Unit:
     """Return the unit of an artifact's task; the bare value where there is none."""
     return Unit(**artifact.manifest.unit) if artifact.manifest.unit else Unit()
+
+
+def show_in_unit(metrics: Metrics, unit: Unit) -> dict[str, Any]:
+    """Return metrics by dotted name as people are shown them: values of the task in its unit, which their names say."""
+    shown = {}
+    for name, value in metrics.items():
+        parts = [part for part in name.split(".") if not part.isdecimal()]
+        valued = parts[-1] in VALUED or tuple(parts[-2:]) == PROMISED
+        number = isinstance(value, int | float) and not isinstance(value, bool)
+        shown[in_unit(name, unit.name) if valued else name] = unit.factor * value if valued and number else value
+    return shown
 
 
 def headline(artifact: Artifact) -> str:

@@ -32,7 +32,8 @@ class Traces(NamedTuple):
     Attributes:
         time: [s].
         command: Desired position [rad].
-        real, simulation: Position [rad].
+        real: Position [rad].
+        simulation: Position in the simulator [rad], if there is one.
         grounded: Position in the grounded simulator [rad], if there is one.
         sent: What the grounding sends in place of the command [rad], if that is to be seen.
         name: Of `grounded`, for people.
@@ -42,7 +43,7 @@ class Traces(NamedTuple):
     time: np.ndarray
     command: np.ndarray
     real: np.ndarray
-    simulation: np.ndarray
+    simulation: np.ndarray | None = None
     grounded: np.ndarray | None = None
     sent: np.ndarray | None = None
     name: str = "grounded simulation"
@@ -67,13 +68,13 @@ def joint_trace_figure(
         rest: Ticks in the beginning in which nothing moves, and which no distance is of.
     """
     factor, unit = traces.scale
-    distances = [_measure(traces.scale, (traces.simulation - traces.real)[rest:])]
+    distances = []
     lines = [("command", traces.command, COMMAND, 1.3, (0, (5, 3))), ("real", traces.real, REAL, 3.2, "-")]
-    lines.append((f"simulation,\n{_with_unit(distances[0], unit)} from real", traces.simulation, SIMULATION, 1.8, "-"))
-    if traces.grounded is not None:
-        distances.append(_measure(traces.scale, (traces.grounded - traces.real)[rest:]))
-        label = f"{traces.name},\n{_with_unit(distances[1], unit)} from real"
-        lines.append((label, traces.grounded, GROUNDED, 1.8, "-"))
+    simulators = {"simulation": (traces.simulation, SIMULATION), traces.name: (traces.grounded, GROUNDED)}
+    for name, (positions, colour) in simulators.items():
+        if positions is not None:
+            distances.append(_measure(traces.scale, (positions - traces.real)[rest:]))
+            lines.append((f"{name},\n{_with_unit(distances[-1], unit)} from real", positions, colour, 1.8, "-"))
     if traces.sent is not None:
         lines.append(("grounded command", traces.sent, GROUNDED, 1.1, (0, (5, 3))))
     with look():

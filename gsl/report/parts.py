@@ -75,13 +75,17 @@ def element(tag: str, *parts: Part, kind: str = "", style: str = "") -> Markup:
 def table(columns: Sequence[Part], rows: Sequence[Sequence[Part]], *, kind: str = "", caption: Part = None) -> Markup:
     """Return a table that scrolls sideways where it is too wide; the first cell of a row is its heading.
 
+    A column without a value in any row is left out.
+
     Args:
         columns: Headings.
         rows: Cells; a cell that is a `<td>` already stays as it is.
         kind: Class of the table.
         caption: Said below it.
     """
-    return _fill("table", columns, rows, kind, caption)
+    empty = {k for k in range(len(columns)) if rows and not any(any(row[k : k + 1]) for row in rows)}
+    lines = [[cell for k, cell in enumerate(line) if k not in empty] for line in (columns, *rows)]
+    return _fill("table", lines[0], lines[1:], kind, caption)
 
 
 def section(title: str, *parts: Part, note: str = "") -> Markup | None:

@@ -40,7 +40,8 @@ def check_viewer() -> None:
     try:
         import rerun  # noqa: F401
     except ImportError as error:
-        raise InputError(f"the viewer needs gsl[rerun]: pip install 'gsl[rerun]' ({error})") from error
+        advice = "pip install 'gsl[rerun]', or gsl render, which writes a film"
+        raise InputError(f"the viewer needs gsl[rerun]: {advice} ({error})") from error
 
 
 def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], path: Path | None) -> None:

@@ -150,13 +150,13 @@ def curves(searches: Sequence[Search], unit: str) -> Markup | None:
     return section("Learning curves", element("div", *drawn, kind="panels"), note=note)
 
 
-def joints(traces: Mapping[str, Traces], note: str) -> Markup | None:
+def joints(traces: Mapping[str, Traces], note: str, title: str = "Joint by joint") -> Markup | None:
     """Return the section with the traces of each joint, of which the reader chooses one."""
     pictures = {
         joint: svg(joint_trace_figure(traces, joint, title="", width=WIDTH), f"traces of {joint}")
         for joint, traces in traces.items()
     }
-    return section("Joint by joint", choice("joint", pictures), note=note)
+    return section(title, choice("joint", pictures), note=note)
 
 
 def footfalls(walks: Sequence[Walk]) -> Markup | None:

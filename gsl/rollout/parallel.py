@@ -15,6 +15,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from pydantic import AfterValidator
 
+from gsl.core.compiling import report_to, share_compilations
 from gsl.core.console import Progress
 from gsl.core.interruption import end_with_parent, processes_starting
 from gsl.core.own_code import name_failures
@@ -136,15 +137,21 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
     if workers == 1 or joblib.effective_n_jobs(workers) == 1 or getattr(engine, "uses_threads", False):
         yield from ((index, function(frozen, jobs[index])) for index in missing)
         return
-    ending = {"initializer": end_with_parent, "initargs": (os.getpid(),)} if isinstance(engine, LokyBackend) else {}
+    told = {"initializer": _begin_worker, "initargs": (os.getpid(), share_compilations())}
+    begin = told if isinstance(engine, LokyBackend) else {}
     # Without max_nbytes=None joblib leaves a file for every large array.
-    parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **ending)
+    parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **begin)
     try:
         with processes_starting():
             results = parallel(joblib.delayed(_run_numbered)(function, frozen, jobs[index], index) for index in missing)
         yield from results
     except TerminatedWorkerError:
         return
+
+
+def _begin_worker(parent: int, marks: str) -> None:
+    end_with_parent(parent)
+    report_to(marks)
 
 
 def _run_numbered(function: Any, frozen: bytes, job: Any, index: int) -> tuple[int, Any]:

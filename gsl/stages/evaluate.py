@@ -11,16 +11,19 @@ import numpy as np
 import scipy
 
 from gsl.core.console import Console
+from gsl.core.described import describe
 from gsl.core.interfaces import REAL, Policy, Task, World
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import difference_interval
+from gsl.core.trust import modules_in
 from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import size
 from gsl.real_robot.errand import Errand, Order, answer_parents, ask
-from gsl.report.evaluation_page import write_evaluation_page
+from gsl.report.evaluation_page import Look, write_evaluation_page
+from gsl.report.iteration import BEGUN
 from gsl.report.run_page import Change
 from gsl.rollout.parallel import Episode, Job, Workers, episodes
 from gsl.rollout.promise import promise
@@ -30,6 +33,7 @@ from gsl.storage.documents import write_json
 from gsl.storage.policies import PolicyRecord, write_policies
 from gsl.storage.policy_choice import EVALUATION, FILE, policies, record, records, vector
 from gsl.storage.references import resolve
+from gsl.validation.evaluation_pictures import look_at
 from gsl.validation.uncharged import warn_uncharged
 from gsl.worlds.external import ExternalRobot
 
@@ -119,8 +123,24 @@ class Evaluate:
         }
         first, chosen = (vector(self.policy, thetas[index]).tolist() for index in (0, best))
         change = Change(self.policy.names, first, chosen, self.policy.scale.tolist())
-        write_evaluation_page(folder, metrics, document, change, Unit.of(self.task))
+        console.phase("drawing the page")
+        look = self._look_at([(thetas[index], fresh[index]) for index in dict.fromkeys((best, 0))])
+        write_evaluation_page(folder, metrics, document, change, Unit.of(self.task), look)
         return metrics
+
+    def _look_at(self, reported: Sequence[tuple[PolicyRecord, Sequence[Episode]]]) -> Look:
+        """Return what there is to see of the reported policies: an episode of each is played once more."""
+        walks = {}
+        for theta, done in reported:
+            shown = next((n for n, episode in enumerate(done) if episode.fell), 0)
+            seed = derive_seed(self.seed, self.kind, _REPORT, theta.name, shown)
+            walks[BEGUN.get(theta.name, theta.name)] = vector(self.policy, theta), seed
+        source = resolve(self.policies) if self.policies else None
+        return look_at(self._scenario, walks, source, modules_in(describe(self)))
+
+    @property
+    def _scenario(self) -> Scenario:
+        return Scenario(self.world, self.task, self.policy, REAL, NoGrounding())
 
     @property
     def _start(self) -> PolicyRecord:
@@ -163,7 +183,7 @@ class Evaluate:
         self, thetas: Sequence[PolicyRecord], purpose: str, count: int, *, console: Console
     ) -> list[list[Episode]]:
         """Return the episodes of some policies; but for a report, none after a fall that is not tolerated."""
-        scenario = Scenario(self.world, self.task, self.policy, REAL, NoGrounding())
+        scenario = self._scenario
         jobs = [
             Job(vector(self.policy, theta), derive_seed(self.seed, self.kind, purpose, theta.name, n))
             for theta in thetas

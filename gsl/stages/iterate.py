@@ -39,7 +39,7 @@ from gsl.storage.trajectories import DATA, read
 from gsl.training.data import HELDOUT, of_policy
 from gsl.validation.compliance_transfer import SECTION, with_real
 from gsl.validation.gate import REPORT
-from gsl.validation.iteration_pictures import draw_flight, draw_walk_and_joint
+from gsl.validation.iteration_pictures import centre, draw_flight, draw_walk_and_joint, show_steps
 from gsl.worlds.external import ExternalRobot
 from gsl.worlds.gymnasium import try_out
 
@@ -203,14 +203,18 @@ class Iterate:
         place = home / FIRST
         search = Artifact(place / "optimize", manifest.read(place / "optimize"))
         scenario = Scenario(self.sim, self.task, self.policy, SIM, without_margins(first)).prepare(search.metrics)
+        real = Scenario(self.real, self.task, self.policy, REAL, NoGrounding()).prepare()
         maker = MAKER if isinstance(innermost(first), Trainable) else TrainForward.kind
         if (place / maker / HELDOUT).is_file():
             heldout = read(place / maker / HELDOUT)
             walk = max(of_policy(heldout, pi0=True) or heldout.episodes, key=len)
-            return draw_walk_and_joint(folder, scenario, walk, returned, self.seed)
+            return draw_walk_and_joint(folder, scenario, real, walk, returned, self.seed)
         if (place / EXCITATION).is_dir():
-            return draw_flight(folder, self.sim, scenario, read(place / EXCITATION / DATA), returned, self.seed)
-        return Seen()
+            log = read(place / EXCITATION / DATA)
+            return draw_flight(folder, self.sim, scenario, real, log, returned, self.seed)
+        if centre(scenario.world) is None:
+            return Seen()
+        return Seen(walks=show_steps(real, scenario, returned, self.seed, "in simulation"))
 
 
 def check_aggregate(iterate: Iterate, groundings: Iterable[Grounding], name: str) -> None:

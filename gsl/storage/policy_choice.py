@@ -13,12 +13,41 @@ from gsl.core.described import describe
 from gsl.core.interfaces import Policy
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
 from gsl.storage.identity import flat
 from gsl.storage.policies import Policies, PolicyRecord, read_policies
 from gsl.storage.references import resolve
 
 FILE = "policies.json"
 EVALUATION = "evaluation.json"  # of policies that were measured
+
+
+def find_search(place: Path) -> Artifact | None:
+    """Return the search whose policies a folder or file holds or a run has measured, None where it is of none."""
+    home = place if place.is_dir() else place.parent
+    if not (home / manifest.NAME).is_file():
+        return None
+    made = manifest.read(home)
+    if made.kind == "optimize":
+        return Artifact(home, made)
+    above = [home / parent.path for parent in made.parents if made.kind == "evaluate" and parent.role == "policies"]
+    above += [find_measurement(home)] if made.kind == "iterate" else []
+    return next(filter(None, map(find_search, above)), None)
+
+
+def find_measurement(run: Path) -> Path:
+    """Return the measurement whose policy a run returned, the last one otherwise.
+
+    Raises:
+        ArtifactError: It has measured none.
+    """
+    places = [run / link.path for link in manifest.read(run).links if link.role == "evaluate"]
+    grounded = [place for place in places if place.name == "evaluate"] or places
+    if not grounded:
+        raise ArtifactError(run, "has measured no policy that could be shown")
+    returned = (run / FILE).read_bytes()
+    same = [place for place in grounded if (place / FILE).is_file() and (place / FILE).read_bytes() == returned]
+    return (same or grounded)[-1]
 
 
 @dataclass(frozen=True)

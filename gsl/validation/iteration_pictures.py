@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.core.body import Robot, lump
-from gsl.core.interfaces import Grounding, World
+from gsl.core.interfaces import Grounding, Policy, World
 from gsl.core.layout import Layout
 from gsl.core.observation import missing, observations
 from gsl.core.seeds import derive_seed
@@ -18,6 +18,7 @@ from gsl.core.transitions import actions
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import LOADED
 from gsl.grounding.none import NoGrounding
+from gsl.policies.policy import describe_command
 from gsl.report.film import Shot, film
 from gsl.report.footfalls import Walk
 from gsl.report.iteration_page import Seen
@@ -59,7 +60,9 @@ class _Listening:
         return self.sent[-1]
 
 
-def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory, returned: np.ndarray, seed: int) -> Seen:
+def draw_walk_and_joint(
+    folder: Path, scenario: Scenario, real: Scenario, walk: Trajectory, returned: np.ndarray, seed: int
+) -> Seen:
     """Draw a real walk that no model has seen, and what a grounded simulator makes of its actions.
 
     Nothing is drawn where there are no joints, or nobody knows where the body was.
@@ -67,6 +70,7 @@ def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory, retu
     Args:
         folder: Where to write.
         scenario: Its grounding is ready to act.
+        real: The real side, on which the policies walk once more if it is simulated.
         walk: A real trajectory.
         returned: Parameters of the policy that is returned, shape (n_parameters,).
         seed: Of all randomness.
@@ -74,57 +78,70 @@ def draw_walk_and_joint(folder: Path, scenario: Scenario, walk: Trajectory, retu
     world = scenario.world
     if not isinstance(world, BulletWorld) or missing(walk, world.layout):
         return Seen()
-    traces = draw_joint(folder, Way(world, NoGrounding()), Way(world, scenario.grounding), walk)
-    _draw_walk(world.plant.robot, Shot("π0", "on the real side", walk, REAL), folder)
-    simulated = [
-        read_footfalls(f"{name} in the grounded simulator", _walk(scenario, parameters, seed))
-        for name, parameters in (("π0", scenario.policy.initial), ("the returned policy", returned))
-    ]
-    walks = [read_footfalls("a held-out walk on the real side", walk), *simulated]
+    traces = _draw_joint(folder, Way(world, NoGrounding()), Way(world, scenario.grounding), walk)
+    _draw_walk(world.plant.robot, Shot("π0", "on the real side", walk, REAL), scenario.policy, folder)
+    held_out = read_footfalls("a held-out walk on the real side", walk)
+    walks = [*([held_out] if held_out else []), *show_steps(real, scenario, returned, seed)]
     caption = (
         "A real walk that nothing was learned from; both simulators start in one of its states and play its actions."
     )
-    return Seen(traces, [walk for walk in walks if walk], caption)
+    return Seen(traces, walks, caption)
 
 
-def draw_flight(folder: Path, sim: World, scenario: Scenario, log: Batch, parameters: np.ndarray, seed: int) -> Seen:
+def draw_flight(
+    folder: Path, sim: World, scenario: Scenario, real: Scenario, log: Batch, parameters: np.ndarray, seed: int
+) -> Seen:
     """Draw a held-out motion in the air, and a walk of the policy that is returned, in the grounded simulator.
 
     Args:
         folder: Where to write.
         sim: The simulator as it was.
         scenario: In the grounded simulator.
+        real: The real side, on which the policies walk once more if it is simulated.
         log: Real motions in the air, of which a part was held out.
         parameters: Of the policy, shape (n_parameters,).
         seed: Of all randomness.
     """
-    grounded = _centre(scenario.world)
+    grounded = centre(scenario.world)
     if not isinstance(sim, BulletWorld) or grounded is None:
         return Seen()
     robot, traces = grounded.plant.robot, {}
     held, steady = (replace(world, floating=False) for world in (sim, grounded))
     shown = _largest_held_out(log, held)
     if not missing(shown, held.layout):
-        traces = draw_joint(folder, Way(held, NoGrounding()), Way(steady, NoGrounding()), shown)
-    walks = []
-    for name, these in (("π0", scenario.policy.initial), ("the returned policy", parameters)):
-        walk = _walk(scenario, these, seed)
-        walks.append(read_footfalls(f"{name} in the grounded simulator", walk))
+        traces = _draw_joint(folder, Way(held, NoGrounding()), Way(steady, NoGrounding()), shown)
+    walk = walk_once(scenario, parameters, derive_seed(seed, WALK))
     if not missing(walk, grounded.layout):
-        _draw_walk(robot, Shot("returned policy", "in the grounded simulator", walk, GROUNDED), folder)
+        shot = Shot("returned policy", "in the grounded simulator", walk, GROUNDED)
+        _draw_walk(robot, shot, scenario.policy, folder)
     caption = "A real motion in the air that nothing was learned from; both simulators play its commands."
-    return Seen(traces, [walk for walk in walks if walk], caption)
+    return Seen(traces, show_steps(real, scenario, parameters, seed), caption)
 
 
-def _walk(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
+def show_steps(
+    real: Scenario, simulated: Scenario, returned: np.ndarray, seed: int, place: str = "in the grounded simulator"
+) -> list[Walk]:
+    """Return the footfalls of π0 and of the policy that is returned, on the real side if that is simulated, in both."""
+    sides = {"on the real side": real} if centre(real.world) else {}
+    walks = [
+        read_footfalls(f"{name} {where}", walk_once(scenario, parameters, derive_seed(seed, WALK)))
+        for where, scenario in {**sides, place: simulated}.items()
+        for name, parameters in (("π0", simulated.policy.initial), ("the returned policy", returned))
+    ]
+    return [walk for walk in walks if walk]
+
+
+def walk_once(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
+    """Return one episode of a policy."""
     env = scenario.make()
-    walk = rollout(scenario, env, parameters, derive_seed(seed, WALK))
-    env.close()
-    return walk
+    try:
+        return rollout(scenario, env, parameters, seed)
+    finally:
+        env.close()
 
 
-def _draw_walk(robot: Robot, shot: Shot, folder: Path) -> None:
-    film(robot, robot.controlled, [shot], folder / WALK)
+def _draw_walk(robot: Robot, shot: Shot, policy: Policy, folder: Path) -> None:
+    film(robot, robot.controlled, [shot._replace(about=", ".join(describe_command(policy)))], folder / WALK)
 
 
 def read_footfalls(label: str, walk: Trajectory) -> Walk | None:
@@ -137,38 +154,47 @@ def read_footfalls(label: str, walk: Trajectory) -> Walk | None:
     return Walk(label, walk.time, feet, fell) if feet else None
 
 
-def draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> dict[str, Traces]:
-    """Draw the joint that moves most, and return the traces of all, that one first.
+def _draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> dict[str, Traces]:
+    """Draw the joint that moves most, and return the traces of all; arguments as those of `trace_joints`."""
+    traces = trace_joints(plain, grounded, real)
+    first = next(iter(traces))
+    joint_trace(folder / TRACE, traces[first]._replace(sent=None), first)
+    return traces
+
+
+def trace_joints(plain: Way, grounded: Way | None, real: Trajectory) -> dict[str, Traces]:
+    """Return the traces of all joints, of the one that moves most first.
 
     Args:
-        folder: Where to write.
         plain: The simulator as it was.
-        grounded: And grounded.
-        real: A real trajectory that nothing was learned from, whose actions are replayed from one of its states.
+        grounded: And grounded, if it was.
+        real: A real trajectory, whose actions are replayed from one of its states.
     """
-    layout, period = plain.world.layout, plain.world.period
-    tick = max(PAST, min(round(TAKEN_OVER / period), len(real) // 2))
-    issued = actions(real, carried_out=True)
+    layout, issued = plain.world.layout, actions(real, carried_out=True)
+    tick, ticks = show_window(real, plain.world.period)
     place = Place(observations(real, layout), issued, tick)
-    ticks = min(round(SHOWN / period), len(real) - tick)
-    (bare, _), (other, sent) = (_observe(way, place, ticks) for way in (plain, grounded))
+    bare, _ = _observe(plain, place, ticks)
+    other, sent = _observe(grounded, place, ticks) if grounded else (None, issued[tick : tick + ticks])
     shown = slice(tick + 1, tick + 1 + ticks)
     changed = not np.array_equal(sent, issued[tick : tick + ticks])
-    traces = {
+    return {
         layout.joints[k]: Traces(
             real.time[shown],
             issued[tick : tick + ticks, k],
             real.position[shown, k],
             bare[:, k],
-            other[:, k],
+            None if other is None else other[:, k],
             sent[:, k] if changed else None,
             scale=scale_of(layout.joints[k], plain.world.plant.robot.slides),
         )
         for k in np.argsort(-np.ptp(real.position[shown], axis=0), kind="stable")
     }
-    first = next(iter(traces))
-    joint_trace(folder / TRACE, traces[first]._replace(sent=None), first)
-    return traces
+
+
+def show_window(real: Trajectory, period: float) -> tuple[int, int]:
+    """Return the tick from which traces are shown, and for how many."""
+    tick = max(PAST, min(round(TAKEN_OVER / period), len(real) // 2))
+    return tick, min(round(SHOWN / period), len(real) - tick)
 
 
 def _observe(way: Way, place: Place, ticks: int) -> tuple[np.ndarray, np.ndarray]:
@@ -179,7 +205,7 @@ def _observe(way: Way, place: Place, ticks: int) -> tuple[np.ndarray, np.ndarray
     return seen, np.array(grounding.sent[-ticks:])
 
 
-def _centre(world: World | EnsembleWorld | RandomisedWorld) -> BulletWorld | None:
+def centre(world: World | EnsembleWorld | RandomisedWorld) -> BulletWorld | None:
     """Return the simulator that stands for all where there are several, None where there are no joints."""
     inner = world.world if isinstance(world, EnsembleWorld | RandomisedWorld) else world
     return inner if isinstance(inner, BulletWorld) else None

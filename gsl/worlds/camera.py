@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
@@ -17,6 +18,7 @@ from gsl.worlds.engine import quiet
 TILE, TILES = 0.25, (34, 10)  # edge of a floor tile [m], how many ahead and aside
 LIGHT = (1.2, -1.6, 2.2)  # direction towards it
 SHADOW = 0.35  # how much darker the floor is in it
+LIT = 300  # width and height of what the light sees [pixels]: fine enough for a shadow that is blurred
 NEAR, FAR = 0.3, 12.0  # what is drawn [m]
 _SKY_TOP, _SKY_LOW = np.array([205.0, 220.0, 238.0]), np.array([248.0, 249.0, 251.0])
 
@@ -39,8 +41,24 @@ class View:
     opening: float = 24.0
 
 
+class Ground(NamedTuple):
+    """What is seen where no robot is.
+
+    Attributes:
+        image: Floor and sky, shape (height, width, 3) of float32.
+        depth: Of every pixel, shape (height, width).
+        floor: Whether a pixel shows the floor, shape (height, width).
+    """
+
+    image: np.ndarray
+    depth: np.ndarray
+    floor: np.ndarray
+
+
 class Camera:
     """A robot on a tiled floor that is posed, not simulated.
+
+    The floor stands still, so it is drawn once for each view: its tiles take longer to draw than the robot.
 
     Args:
         robot: With its fixed joints; it shows its shapes.
@@ -50,12 +68,12 @@ class Camera:
         with quiet(), Scratch() as folder:
             import pybullet
 
-            self._bullet, self._client = pybullet, pybullet.connect(pybullet.DIRECT)
+            self._bullet = pybullet
+            self._bare, self._client = (pybullet.connect(pybullet.DIRECT) for _ in range(2))
             for name, text in (("floor", _floor()), ("robot", urdf(robot, meshes=Path(folder)))):
                 Path(folder, f"{name}.urdf").write_text(text)
-            load = {"useFixedBase": True, "physicsClientId": self._client}
-            self._floor = pybullet.loadURDF(f"{folder}/floor.urdf", **load)
-            self._body = pybullet.loadURDF(f"{folder}/robot.urdf", **load)
+            pybullet.loadURDF(f"{folder}/floor.urdf", useFixedBase=True, physicsClientId=self._bare)
+            self._body = pybullet.loadURDF(f"{folder}/robot.urdf", useFixedBase=True, physicsClientId=self._client)
         rows = [
             pybullet.getJointInfo(self._body, i, self._client)
             for i in range(pybullet.getNumJoints(self._body, self._client))
@@ -63,10 +81,12 @@ class Camera:
         self._joints = {row[1].decode(): row[0] for row in rows}
         self._centre = pybullet.getDynamicsInfo(self._body, -1, self._client)[3:5]
         self._place = [0.0, 0.0, 0.0]
+        self._seen: tuple[View, tuple[int, int], Ground] | None = None
 
     def close(self) -> None:
-        """Free the client."""
-        self._bullet.disconnect(self._client)
+        """Free the clients."""
+        for client in (self._bare, self._client):
+            self._bullet.disconnect(client)
 
     def pose(self, angles: Mapping[str, float], place: Sequence[float], quaternion: Sequence[float]) -> None:
         """Put the robot somewhere.
@@ -87,19 +107,21 @@ class Camera:
         """Return an image, shape (height, width, 3) of uint8, drawn `finer` times as large and averaged."""
         size = (finer * width, finer * height)
         eye, lens = self._look(view, width / height)
-        colours, depth, seen = self._draw(eye, lens, size)
-        places = _places(depth, eye, lens)
-        shade = 1.0 - SHADOW * gaussian_filter(self._shadow(places), 1.5 * finer)
-        image = np.where((seen == self._floor)[..., None], colours * shade[..., None], colours)
-        down = np.linspace(0.0, 1.0, size[1])[:, None, None]
-        image = np.where((seen < 0)[..., None], (1.0 - down) * _SKY_TOP + down * _SKY_LOW, image)
-        averaged: np.ndarray = image.reshape(height, finer, width, finer, 3).mean(axis=(1, 3)).round().astype(np.uint8)
-        return averaged
+        ground = self._ground(view, size)
+        image = ground.image.copy()
+        (left, upper, right, lower), shadow = self._shadow(eye, lens, size, 1.5 * finer)
+        part = np.s_[upper:lower, left:right]
+        image[part] *= 1.0 - SHADOW * (shadow * ground.floor[part])[..., None]
+        colours, depth, seen = self._draw(self._client, eye, lens, size)
+        robot = (seen >= 0) & (depth <= ground.depth)
+        image[robot] = colours[robot]
+        averaged: np.ndarray = image.reshape(height, finer, width, finer, 3).mean(axis=(1, 3)) if finer > 1 else image
+        return averaged.round().astype(np.uint8)
 
     def project(self, points: np.ndarray, view: View, width: int, height: int) -> np.ndarray:
         """Return where points [m], shape (n, 3), are in a picture [pixels], shape (n, 2), right and down."""
         eye, lens = self._look(view, width / height)
-        flat = _with_ones(points) @ _matrix(eye).T @ _matrix(lens).T
+        flat = np.column_stack([points, np.ones(len(points))]) @ _matrix(eye).T @ _matrix(lens).T
         return 0.5 * (1.0 + flat[:, :2] / flat[:, 3:] * [1.0, -1.0]) * [width, height]
 
     def _look(self, view: View, ratio: float) -> tuple[Sequence[float], Sequence[float]]:
@@ -108,46 +130,60 @@ class Camera:
         eye = b.computeViewMatrixFromYawPitchRoll(list(view.target), view.distance, view.yaw - 90.0, view.pitch, 0.0, 2)
         return eye, b.computeProjectionMatrixFOV(view.opening, ratio, NEAR, FAR)
 
-    def _draw(self, eye: Sequence[float], lens: Sequence[float], size: tuple[int, int]) -> tuple[np.ndarray, ...]:
-        """Colours, depth and number of the body at every pixel."""
+    def _ground(self, view: View, size: tuple[int, int]) -> Ground:
+        """What is seen without the robot; kept until another view is wanted."""
+        if self._seen is None or self._seen[:2] != (view, size):
+            colours, depth, seen = self._draw(self._bare, *self._look(view, size[0] / size[1]), size)
+            down = np.linspace(0.0, 1.0, size[1])[:, None, None]
+            sky = (1.0 - down) * _SKY_TOP + down * _SKY_LOW
+            image = np.where((seen < 0)[..., None], sky, colours).astype(np.float32)
+            self._seen = view, size, Ground(image, depth, seen >= 0)
+        return self._seen[2]
+
+    def _draw(
+        self, client: int, eye: Sequence[float], lens: Sequence[float], size: tuple[int, int]
+    ) -> tuple[np.ndarray, ...]:
+        """Colours, depth and number of the body at every pixel, below 0 where there is none."""
         _, _, pixels, depth, seen = self._bullet.getCameraImage(
             *size, eye, lens, lightDirection=LIGHT, lightColor=[1.0, 1.0, 1.0], shadow=0, lightAmbientCoeff=0.68,
             lightDiffuseCoeff=0.38, lightSpecularCoeff=0.05, renderer=self._bullet.ER_TINY_RENDERER,
-            physicsClientId=self._client,
+            physicsClientId=client,
         )  # fmt: skip
         shape = (size[1], size[0])
-        return np.reshape(pixels, (*shape, 4))[..., :3].astype(float), np.reshape(depth, shape), np.reshape(seen, shape)
+        return np.reshape(pixels, (*shape, 4))[..., :3], np.reshape(depth, shape), np.reshape(seen, shape)
 
-    def _shadow(self, places: np.ndarray) -> np.ndarray:
-        """1 where the robot hides the light from a place, else 0: it is what the light itself sees there."""
-        b, size = self._bullet, 400
-        light = (np.array(self._place) + 3.0 * np.array(LIGHT) / np.linalg.norm(LIGHT)).tolist()
-        eye = b.computeViewMatrix(light, self._place, [0.0, 0.0, 1.0])
-        lens = b.computeProjectionMatrixFOV(20.0, 1.0, NEAR, FAR)
-        robot = self._draw(eye, lens, (size, size))[2] == self._body
-        flat = _with_ones(places) @ _matrix(eye).T @ _matrix(lens).T
-        x, y = flat[..., 0] / flat[..., 3], -flat[..., 1] / flat[..., 3]
-        column, row = (np.clip((0.5 * (part + 1.0) * size).astype(int), 0, size - 1) for part in (x, y))
-        inside = (np.abs(x) < 1.0) & (np.abs(y) < 1.0)
-        return np.where(inside, robot[row, column], False).astype(float)
+    def _shadow(
+        self, eye: Sequence[float], lens: Sequence[float], size: tuple[int, int], blur: float
+    ) -> tuple[tuple[int, int, int, int], np.ndarray]:
+        """How much of the light the robot hides from the floor, 0 to 1, and where in the picture that is [pixels].
 
+        It is what the light itself sees of the robot: the floor is a plane, so one picture is the other in perspective.
+        """
+        from PIL import Image
 
-def _with_ones(points: np.ndarray) -> np.ndarray:
-    return np.concatenate([points, np.ones_like(points[..., :1])], axis=-1)
+        b, light = self._bullet, (np.array(self._place) + 3.0 * np.array(LIGHT) / np.linalg.norm(LIGHT)).tolist()
+        towards = b.computeViewMatrix(light, self._place, [0.0, 0.0, 1.0])
+        beam = b.computeProjectionMatrixFOV(20.0, 1.0, NEAR, FAR)
+        robot = self._draw(self._client, towards, beam, (LIT, LIT))[2] >= 0
+        floor = _onto(towards, beam, (LIT, LIT)) @ np.linalg.inv(_onto(eye, lens, size))
+        ways = (floor / floor[2, 2]).ravel()[:8].tolist()
+        mask = Image.fromarray(np.where(robot, 255, 0).astype(np.uint8)).transform(
+            size, Image.Transform.PERSPECTIVE, ways, Image.Resampling.BILINEAR
+        )
+        left, upper, right, lower = mask.getbbox() or (0, 0, 0, 0)
+        edge = round(4.0 * blur)  # beyond it nothing is left of the blur
+        box = max(left - edge, 0), max(upper - edge, 0), min(right + edge, size[0]), min(lower + edge, size[1])
+        return box, gaussian_filter(np.asarray(mask.crop(box), dtype=np.float32) / 255.0, blur)
 
 
 def _matrix(column_major: Sequence[float]) -> np.ndarray:
     return np.reshape(column_major, (4, 4)).T
 
 
-def _places(depth: np.ndarray, eye: Sequence[float], lens: Sequence[float]) -> np.ndarray:
-    """World coordinates [m] of what every pixel shows, shape (height, width, 3)."""
-    height, width = depth.shape
-    x, y = np.meshgrid((np.arange(width) + 0.5) / width * 2.0 - 1.0, 1.0 - (np.arange(height) + 0.5) / height * 2.0)
-    flat = np.stack([x, y, 2.0 * depth - 1.0, np.ones_like(x)], axis=-1)
-    places: np.ndarray = flat @ np.linalg.inv(_matrix(lens) @ _matrix(eye)).T
-    places = places[..., :3] / places[..., 3:]
-    return places
+def _onto(eye: Sequence[float], lens: Sequence[float], size: tuple[int, int]) -> np.ndarray:
+    """Return the matrix from x, y, 1 of the floor [m] to right, down [pixels] and 1, but for a factor, shape (3, 3)."""
+    x, y, _, w = (_matrix(lens) @ _matrix(eye))[:, [0, 1, 3]]
+    return np.array([0.5 * size[0] * (w + x), 0.5 * size[1] * (w - y), w])
 
 
 def _floor() -> str:

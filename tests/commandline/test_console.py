@@ -198,7 +198,7 @@ def test_a_terminal_shows_a_phase_at_once_and_without_colours_where_there_are_no
         console.table("result", ["a"], [[1]])
     said = capsys.readouterr().err
     assert "looking at the wiring, 0 s" in said and "result" in said
-    assert not re.search(r"\x1b\[[\d;]*3\d[\d;]*m", said)
+    assert not re.search(r"\x1b\[[\d;]*m", said)
 
 
 def test_quiet_shows_no_progress(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
@@ -225,7 +225,7 @@ def test_a_terminal_without_colours_gets_none(
         progress.advance(2)
     said = capsys.readouterr().err
     assert "50 % done" in said and "best 20.0 cm/s in simulation, 2 falls" in said
-    assert not re.search(r"\x1b\[[\d;]*3\d[\d;]*m", said)
+    assert not re.search(r"\x1b\[[\d;]*m", said)
 
 
 def test_quiet_leaves_results_warnings_and_errors(capsys: pytest.CaptureFixture[str]) -> None:

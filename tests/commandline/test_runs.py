@@ -14,6 +14,7 @@ import pytest
 from commands import done, gsl, refused
 
 from gsl.storage.artifact import build
+from gsl.tasks.walk import Walk
 
 
 @dataclass
@@ -23,6 +24,7 @@ class Measuring:
     kind: str
     metrics: Mapping[str, Any]
     above: Mapping[str, Path]
+    task: Any = None
 
     def parents(self) -> Mapping[str, Path]:
         return self.above
@@ -114,6 +116,20 @@ def test_diff_shows_what_differs_and_nothing_else(home: Path) -> None:
     assert "-0.2" in done("diff", "walk0/optimize", "walk1", folder=home).out
     assert "the same settings" in done("diff", "walk1", "walk1", folder=home).out
     assert "did you mean walk1" in refused("diff", "walk1", "walc1", folder=home)
+
+
+def test_diff_shows_a_quantity_in_one_unit(home: Path) -> None:
+    for name, speed in (("slow", 0.2), ("fast", 0.25)):
+        metrics = {"value": speed, "interval": [speed, None], "gain": {"share": speed}, "outcome": {"way [m]": speed}}
+        stage = Measuring("evaluate", {"returned": metrics}, {}, Walk())
+        build(stage, config={}, out=Path("runs") / name, command="gsl evaluate", force=False, console=None)  # type: ignore[arg-type]
+    rows = {line.split("  ")[1]: line.split() for line in done("diff", "slow", "fast", folder=home).out.splitlines()
+            if line.startswith("  returned.")}  # fmt: skip
+    assert rows["returned.value [cm/s]"][-3:] == ["20", "25", "+5"]
+    assert rows["returned.interval.0 [cm/s]"][-3:] == rows["returned.value [cm/s]"][-3:]
+    assert rows["returned.gain.share"][-3:] == rows["returned.outcome.way [m]"][-3:] == ["0.2", "0.25", "+0.05"]
+    metrics = json.loads(done("diff", "slow", "fast", "--json", folder=home).out)["metrics"]
+    assert metrics["returned.value"] == [0.2, 0.25]
 
 
 def test_clean_removes_what_it_has_named_when_it_is_asked_to(home: Path) -> None:

@@ -121,6 +121,21 @@ def test_the_first_step_which_compiles_is_no_pace(seconds: float) -> None:
         assert load.text() == "52 % done, about 10 s left; stage 1 of 1, walking: 11 of 21, 1.0 a second"
 
 
+def test_compilation_is_said_in_place_of_the_time_left_and_is_no_pace() -> None:
+    load, clock, _ = work()
+    with load.plan("stage", [Part(20.0, 2), Part(20.0, 20)]), load.loop(2, "collecting") as loop:
+        loop.advance()
+        count_compilation(1)
+        for _ in range(60):
+            assert "about" not in load.text() and "collecting: 1 of 2, compiling, once" in load.text()
+            clock.now += 2.0
+        count_compilation(-1)
+        assert "about 30 s left" in load.text()
+        clock.now += 10.0
+        loop.advance()
+        assert load.text() == "50 % done, about 20 s left; stage 1 of 2, collecting: 2 of 2, 10.0 s each"
+
+
 def test_a_phase_has_its_own_clock_until_a_loop_or_a_part_says_more() -> None:
     load, clock, _ = work()
     with load.at_work("diagnose"):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import hashlib
+import json
 import math
 import re
 from pathlib import Path
@@ -18,7 +19,7 @@ from gsl.core.unit import Unit
 from gsl.report.account import evaluation_table
 from gsl.report.charts import Bar, Curve, Dot, Pair, Span, bar_chart, dot_chart, line_chart, scatter
 from gsl.report.console import Console
-from gsl.report.evaluation_page import write_evaluation_page
+from gsl.report.evaluation_page import Look, write_evaluation_page
 from gsl.report.footfalls import Walk, footfall_figure
 from gsl.report.iteration_page import grounding
 from gsl.report.joint_trace import Traces
@@ -58,8 +59,8 @@ METRICS = {
 CHANGE = Change(("step-x", "swing"), (0.2, 1.0), (0.25, 0.9), (0.1, 0.5))
 
 
-def written(folder: Path, metrics: dict[str, Any] = METRICS) -> str:
-    write_evaluation_page(folder, metrics, DOCUMENT, CHANGE, UNIT)
+def written(folder: Path, metrics: dict[str, Any] = METRICS, look: Look = Look()) -> str:  # noqa: B008  a constant
+    write_evaluation_page(folder, metrics, DOCUMENT, CHANGE, UNIT, look)
     return (folder / "report.html").read_text("utf-8")
 
 
@@ -78,6 +79,21 @@ def test_a_policy_alone_has_neither_curve_nor_change(tmp_path: Path) -> None:
     said = words(written(tmp_path, alone))
     assert "How good is this policy on the real side?" in said and "Pi0 alone was measured: 19.0 cm/s (95 % " in said
     assert "Learning curves" not in said and "The policy before and after" not in said
+
+
+def test_an_evaluation_shows_joints_feet_and_falls_of_what_it_reports(tmp_path: Path) -> None:
+    check = tmp_path / "grounding.json"
+    check.write_text(json.dumps({"compliance": {"groups": {"legs": {"stiffness": {"sim": 150.0, "grounded": 82.2}}}}}))
+    real = trace(0.1)._replace(simulation=None, grounded=None)
+    feet = Walk("generation_01 on the real side", TIME, {"left": TIME < 0.4}, fell=0.7)
+    said = words(
+        written(tmp_path, look=Look({"generation_01": {"knee": trace(0.1)}, "π0": {"hip": real}}, [feet], check))
+    )
+    assert "What grounding changes" in said and "legs stiffness [N·m/rad] 150 82.2" in said
+    best, _, start = said.partition("Joint by joint: generation_01")[2].partition("Joint by joint: π0")
+    assert "knee [°]" in best and "from real" in best and "play its actions" in best
+    assert "hip [°]" in start and "from real" not in start and "play its actions" not in start
+    assert "generation_01 on the real side" in start and " fell" in start.partition("Footfalls")[2]
 
 
 def test_a_gain_that_may_be_none_is_called_so(tmp_path: Path) -> None:
@@ -281,6 +297,12 @@ def test_charts_tell_their_labels_and_values() -> None:
     assert "simulator" in words(str(bars)) and "4.00 × → 1.00 ×" in words(str(bars))
     assert "gain of knee" in words(str(dots)) and "80 %" in words(str(dots))
     assert {"diagnosed", "real", "sim"} <= {*words(str(pairs)).split()}
+
+
+def test_a_column_without_a_value_is_left_out() -> None:
+    rows = [("gat", "", "0.5", None), ("none", "", "", None)]
+    assert words(table(("grounding", "drift", "promise", "rank"), rows)) == "grounding promise gat 0.5 none"
+    assert words(table(("grounding", "drift"), [])) == "grounding drift"
 
 
 def test_text_is_escaped_once_and_markup_never() -> None:

@@ -1,6 +1,7 @@
 """Pictures and films of the robot: a camera that stands still, the way, the command, the fall."""
 
 import json
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from gsl.commandline.robot_files import write_robot
 from gsl.core.trajectory import Trajectory
 from gsl.errors import ConfigError, InputError
 from gsl.grounding.none import NoGrounding
+from gsl.policies.policy import describe_command
 from gsl.policies.walk_engine import WalkEngine
 from gsl.report.console import Console
 from gsl.report.film import RATE, SHEET, WIDTH, Shot, check_format, film
@@ -22,6 +24,7 @@ from gsl.report.render import portrait
 from gsl.robots.nao import nao
 from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
+from gsl.worlds.camera import LIGHT, SHADOW, Camera, View
 
 RED, GREEN = "#d55e00", "#009e73"
 
@@ -44,6 +47,11 @@ def orange(image: np.ndarray) -> np.ndarray:
 
 
 def sheet(shots: list[Shot], path: Path) -> np.ndarray:
+    """The moments, without the traces below."""
+    return whole_sheet(shots, path)[:-HEIGHT]
+
+
+def whole_sheet(shots: list[Shot], path: Path) -> np.ndarray:
     film(nao(), nao().controlled, shots, path)
     return np.asarray(Image.open(path).convert("RGB"))
 
@@ -55,6 +63,23 @@ def test_the_portrait_shows_a_robot_on_a_floor(tmp_path: Path) -> None:
     assert 0.02 < orange(image).mean() < 0.3
     rows = np.flatnonzero(orange(image).any(axis=1))
     assert rows[0] < 0.25 * 225 and rows[-1] > 0.6 * 225, "from the ears to the knees"
+
+
+def test_a_shadow_lies_where_the_robot_hides_the_light_and_no_view_forgets_another(tmp_path: Path) -> None:
+    views = [View((0.0, 0.0, 0.3), distance, yaw=90.0) for distance in (3.0, 2.0)]
+    place = np.array([0.2, 0.0, 0.33])
+    hidden = place - np.array(LIGHT) * place[2] / LIGHT[2]  # where a ray through the robot's middle meets the floor
+    with closing(Camera(nao())) as camera:
+        pictures = []
+        for where in (place, place + [90.0, 0.0, 0.0], place):  # the second time nobody is there
+            camera.pose({}, where.tolist(), (0.0, 0.0, 0.0, 1.0))
+            pictures.append([camera.picture(view, 400, 200, finer=1).astype(int) for view in views])
+        for k, view in enumerate(views):
+            right, down = camera.project(hidden[None], view, 400, 200)[0].astype(int)
+            lit, shaded = pictures[1][k][down, right], pictures[0][k][down, right]
+            np.testing.assert_allclose(shaded, (1.0 - SHADOW) * lit, atol=3)
+            np.testing.assert_array_equal(pictures[0][k], pictures[2][k])
+            assert orange(pictures[0][k]).any() and not orange(pictures[1][k]).any()
 
 
 def test_a_sheet_shows_the_way_from_a_camera_that_stands_still(walk, tmp_path: Path) -> None:
@@ -75,6 +100,16 @@ def test_two_sides_stand_beside_each_other(walk, tmp_path: Path) -> None:
     assert both.shape[0] == 2 * alone.shape[0]
     left, right = np.split(both, 2, axis=1)
     np.testing.assert_array_equal(left, right)
+
+
+def test_a_sheet_marks_the_command_over_time_and_says_the_conditions(walk, tmp_path: Path) -> None:
+    plain = whole_sheet([Shot("a", "", walk, RED)], tmp_path / "plain.png")
+    told = whole_sheet([Shot("a", "", walk, RED, "nao_worn, forward 1 m/s, seed 1")], tmp_path / "told.png")
+    marks = (plain[-HEIGHT:] == 0).all(axis=(0, 2))
+    assert np.count_nonzero(marks) == SHEET and np.ptp(np.diff(np.flatnonzero(marks))) <= 1
+    differs = np.split((plain != told).any(axis=2)[:-HEIGHT], SHEET // 2)
+    assert all(part[:40].any() and not part[40:].any() for part in differs), "once a moment, above the robot"
+    assert describe_command(WalkEngine(left=-0.1)) == ["walk_engine", "forward 1 m/s", "left -0.1 m/s"]
 
 
 def test_a_fall_is_marked_when_it_happens(walk, tmp_path: Path) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import os
 import pickle
 import signal
+import threading
+import time
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -15,6 +17,7 @@ import numpy as np
 import pytest
 from scenarios import QUIET, arm, walk
 
+from gsl.core.compiling import count_compilation, is_compiling
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
 from gsl.rollout import parallel
@@ -92,10 +95,41 @@ def _dies(marker: Path, frozen: bytes, job: Job) -> int:
     return 0
 
 
+def _compiles(seen: Path, frozen: bytes, job: Job) -> int:
+    count_compilation(1)
+    while not seen.exists():
+        time.sleep(0.01)
+    count_compilation(-1)
+    return job.seed
+
+
+def _dies_compiling(marker: Path, frozen: bytes, job: Job) -> int:
+    count_compilation(1)
+    _dies_once(marker, frozen, job)
+    count_compilation(-1)
+    return job.seed
+
+
 def _in_parallel(function: Callable[..., int], tmp_path: Path) -> list[int]:
     jobs = [Job(np.zeros(1), seed) for seed in range(10, 16)]
     with QUIET.progress(len(jobs), "") as progress:
         return parallel.in_parallel(partial(function, tmp_path / "died"), arm(), jobs, 2, progress)
+
+
+def test_it_is_seen_when_a_worker_compiles_until_it_is_done_or_dead(tmp_path: Path) -> None:
+    def look() -> None:
+        while not is_compiling():
+            time.sleep(0.01)
+        (tmp_path / "died").touch()
+
+    watching = threading.Thread(target=look)
+    watching.start()
+    assert _in_parallel(_compiles, tmp_path) == [*range(10, 16)]
+    watching.join()
+    assert not is_compiling()
+    (tmp_path / "died").unlink()
+    assert _in_parallel(_dies_compiling, tmp_path) == [*range(10, 16)]
+    assert not is_compiling()
 
 
 class Closure:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from page_reader import Page
 from scenarios import GROUND, QUIET
 from scripted_walks import AsScripted, Numbered, ScriptedWorld
 
@@ -68,6 +69,14 @@ def test_a_policy_that_falls_costs_no_further_episode_and_is_worth_nothing(three
     falling = table["policies"][1]
     assert falling["falls"] == 1 and falling["values"][-1] == 0.0
     assert metrics["real_episodes"] == 2 + falling["episodes"] + 2 + 2 + 3 + 3
+
+
+def test_the_page_shows_the_joints_and_feet_of_what_is_reported(three: tuple[dict, dict, Path]) -> None:
+    text = (three[2] / "report.html").read_text("utf-8")
+    for told in ("Joint by joint: fast", "Joint by joint: π0", "fast on the real side", "π0 on the real side"):
+        assert told in text
+    assert "from real" not in text  # of no search, no simulator is told
+    assert Page(text).tags["option"] == 2 * len(GROUND.layout.joints)
 
 
 def test_fresh_episodes_are_not_those_of_the_choice(three: tuple[dict, dict, Path]) -> None:

@@ -166,6 +166,10 @@ def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[
     assert len([attribute for attribute in seen.attributes if attribute[1] == "data-of"]) == seen.tags["option"] > 1
     for section in ("Learning curves", "What grounding changes", "Joint by joint", "Footfalls", "Real data", "Lineage"):
         assert section in said
+    sides = ("on the real side", "in the grounded simulator")
+    assert all(f"{name} {side}" in said for side in sides for name in ("π0", "the returned policy"))
+    measured = words(pages["iteration_01/evaluate"])
+    assert "Joint by joint: " in measured and "from real" in measured and "What grounding changes" in measured
     assert "../iteration_01/evaluate" in said and "gsl iterate" in said
     check_seen(run / "iterate/report.html", f"{100.0 * metrics['returned']['value']:.1f}")
 

@@ -1,0 +1,83 @@
+"""What a person looks at after `evaluate`: the joints and feet of the policies that were reported."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from gsl.commandline.rebuild import rebuild_search
+from gsl.core.layout import Layout
+from gsl.core.observation import missing
+from gsl.core.trajectory import Trajectory
+from gsl.errors import GslError
+from gsl.grounding.none import NoGrounding
+from gsl.report.evaluation_page import Look
+from gsl.report.joint_trace import Traces
+from gsl.report.shown import scale_of
+from gsl.rollout.rollout import Scenario
+from gsl.storage.artifact import Artifact
+from gsl.storage.policy_choice import find_search
+from gsl.validation.gate import REPORT
+from gsl.validation.iteration_pictures import Way, centre, read_footfalls, show_window, trace_joints, walk_once
+from gsl.validation.replay import PAST
+
+SHORTEST = 2 * PAST  # ticks of a walk whose joints are shown: where it fell at once there is no state to begin in
+
+
+def look_at(
+    real: Scenario, walks: Mapping[str, tuple[np.ndarray, int]], source: Path | None, trust: Sequence[str]
+) -> Look:
+    """Return what there is to see of policies; nothing of a robot that is elsewhere, or of what is no robot.
+
+    Args:
+        real: The real side.
+        walks: Parameters and seed of the episode that is shown, by the name of the policy; the best one first.
+        source: Where the policies come from.
+        trust: Modules that are not gsl's and whose classes settings may name.
+    """
+    body, searched = centre(real.world), _find(source)
+    check = searched.folder / REPORT if searched else None
+    if body is None:
+        return Look(check=check)
+    episodes = {name: walk_once(real, *walk) for name, walk in walks.items()}
+    steps = [read_footfalls(f"{name} on the real side", walk) for name, walk in episodes.items()]
+    ways: list[Way] = []
+    try:
+        if searched:
+            plain, grounded = rebuild_search(searched, trust)
+            ways = [Way(simulator, NoGrounding())] if (simulator := centre(plain.world)) else []
+            if ways and not isinstance(plain.grounding, NoGrounding) and (inner := centre(grounded.world)):
+                ways.append(Way(inner, grounded.grounding))
+            name, walk = next(iter(walks.items()))
+            where = "in the grounded simulator" if len(ways) > 1 else "in simulation"
+            steps.append(read_footfalls(f"{name} {where}", walk_once(grounded, *walk)))
+    except GslError:  # the search is gone, or its settings name code that nobody has trusted here
+        ways = []
+    slides = body.plant.robot.slides
+    long = {name: walk for name, walk in episodes.items() if len(walk) >= SHORTEST}
+    traces = {name: _trace(ways, walk, body.layout, slides) for name, walk in long.items()}
+    return Look(traces, [step for step in steps if step], check)
+
+
+def _find(source: Path | None) -> Artifact | None:
+    try:
+        return find_search(source) if source else None
+    except GslError:  # what the policies were measured in is gone
+        return None
+
+
+def _trace(ways: Sequence[Way], walk: Trajectory, layout: Layout, slides: Sequence[str]) -> Mapping[str, Traces]:
+    """Return the traces of all joints, with the simulators where these can begin in a state of the walk."""
+    if ways and not missing(walk, ways[0].world.layout):
+        return trace_joints(ways[0], ways[1] if len(ways) > 1 else None, walk)
+    tick, ticks = show_window(walk, layout.control_period)
+    time, shown = slice(tick + 1, tick + 1 + ticks), slice(tick, tick + ticks)
+    order = np.argsort(-np.ptp(walk.position[time], axis=0), kind="stable")
+    return {
+        layout.joints[k]: Traces(
+            walk.time[time], walk.action[shown, k], walk.position[time, k], scale=scale_of(layout.joints[k], slides)
+        )
+        for k in order
+    }
