@@ -100,7 +100,9 @@ def say(robot: Robot, joints: Sequence[str], unit: str) -> tuple[float, str]:
         return 1.0, unit
     if len(ways) == 1:
         return float(ways.pop() ** -exponent), unit_of_slide(unit)
-    return 1.0, f"{unit} (of slides: by their size)"
+    shares = sorted(float(way**-exponent) for way in ways - {1.0})
+    share = " to ".join(dict.fromkeys(f"{share:.3g}" for share in (shares[0], shares[-1])))
+    return 1.0, f"{unit} (1 {unit} stands for {share} {unit_of_slide(unit)} of a slide)"
 
 
 def write_angle(robot: Robot, joint: str, angle: float, form: str = "+.0f") -> str:

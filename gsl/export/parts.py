@@ -38,10 +38,12 @@ class Export(NamedTuple):
     Attributes:
         files: Contents by file name.
         missing: What it cannot hold, a line each.
+        lacking: Libraries for want of which a file was left out, by the name that they are imported by.
     """
 
     files: Mapping[str, str | bytes]
     missing: Sequence[str]
+    lacking: Sequence[str] = ()
 
 
 def unheld(plant: Plant, held: Collection[str], remarks: Mapping[str, str] | None = None) -> list[str]:

@@ -75,13 +75,15 @@ def export_servo(simulator: Simulator) -> Export:
         f"{name}_servo.json": pretty(about),
         f"{name}_servo_reference.py": reference,
     }
-    missing = unheld(plant, HELD)
+    missing, lacking = unheld(plant, HELD), []
     try:
         files[f"{name}_servo.onnx"] = _onnx(module, len(plant.robot.motors))
     except ImportError as error:
-        advice = "pip install 'gsl[onnx]', and export under another name="  # under this one it is there, unchanged
-        missing.append(f"the ONNX file, which needs gsl[onnx]: {advice} ({error})")
-    return Export(files, missing)
+        lacking = ["onnx"]
+        missing.append(
+            f"the ONNX file, which needs gsl[onnx]: pip install 'gsl[onnx]', and give the same command ({error})"
+        )
+    return Export(files, missing, lacking)
 
 
 def law_module(plant: Plant) -> Any:

@@ -61,7 +61,13 @@ class Function:
         call = self._call(self.callee) if isinstance(self.callee, type) else self.callee
 
         def answer(observation: np.ndarray) -> np.ndarray:
-            return np.asarray(self._call(call, observation.copy()), dtype=float)
+            returned = self._call(call, observation.copy())
+            try:
+                return np.asarray([] if returned is None else returned, dtype=float)
+            except (TypeError, ValueError, RuntimeError) as error:  # the last of a tensor with gradients
+                reason = " ".join(str(error).split())
+                kind = type(returned).__name__
+                raise GslError(f"{self.name}: returns no array of numbers but {kind}: {reason}") from error
 
         return answer
 

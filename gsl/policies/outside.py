@@ -18,6 +18,8 @@ from typing import Annotated, Any, NamedTuple, Protocol, Self
 import numpy as np
 
 from gsl.core.budget import NETWORK_BYTES, check_file
+from gsl.core.console import Console
+from gsl.core.interfaces import Policy
 from gsl.core.layout import Layout
 from gsl.core.setting import setting
 from gsl.errors import ConfigError
@@ -102,6 +104,14 @@ class Outside(ABC):
         """Return the policy at the beginning of an episode."""
         offset = np.asarray(parameters, dtype=float)
         return WiredRun(self.wiring, layout, self.network().begin(), offset if offset.any() else None, self.name)
+
+
+def warn_of_wiring(policy: Policy, layout: Layout, console: Console) -> None:
+    """Say what looks wrong in the wiring of a policy that gsl did not make, and may be meant."""
+    if isinstance(policy, Outside):
+        for finding in audit(policy.wiring, policy.network().ports, layout):
+            if finding.setting:
+                console.status(f"warning: {finding.setting}: {finding.line}")
 
 
 class OutsideFile(Outside):

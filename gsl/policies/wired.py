@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import gymnasium
@@ -90,8 +91,7 @@ class WiredRun:
 
     def __init__(self, wiring: Wiring, layout: Layout, answer: Answer, offset: np.ndarray | None, where: str) -> None:
         self._eyes, self._hands, self._answer = Eyes(wiring, layout), Hands(wiring, layout), answer
-        self._offset, self._where, self._count = offset, where, wiring.outputs(layout)
-        self._single = layout.choices > 0  # a choice may be one number
+        self._offset, self._check = offset, partial(check_outputs, wiring=wiring, layout=layout, where=where)
 
     def act(self, observation: np.ndarray) -> np.ndarray:
         """Return the action, shape (n_joints,).
@@ -99,14 +99,30 @@ class WiredRun:
         Raises:
             GslError: The network returns another number of outputs, or one that is not finite.
         """
-        outputs = np.asarray(self._answer(self._eyes.look(observation)), dtype=float).ravel()
-        if len(outputs) != self._count and not (self._single and len(outputs) == 1):
-            raise GslError(f"{self._where}: returns {len(outputs)} numbers; the wiring has {self._count} outputs")
-        if not np.isfinite(outputs).all():
-            raise GslError(f"{self._where}: output {int(np.argmin(np.isfinite(outputs)))} is not finite")
+        outputs = self._check(self._answer(self._eyes.look(observation)))
         self._eyes.episode.last_action = outputs
         action = self._hands.act(outputs)
         return action if self._offset is None else action + self._offset
+
+
+def check_outputs(answer: np.ndarray, wiring: Wiring, layout: Layout, where: str) -> np.ndarray:
+    """Return what a network has answered as its outputs, shape (n_outputs,).
+
+    Args:
+        answer: Of any shape.
+        wiring: Of the network.
+        layout: Of the world.
+        where: What an error calls the network.
+
+    Raises:
+        GslError: It is another number of outputs, or one is not finite.
+    """
+    outputs, count = np.asarray(answer, dtype=float).ravel(), wiring.outputs(layout)
+    if len(outputs) != count and not (layout.choices and len(outputs) == 1):  # a choice may be one number
+        raise GslError(f"{where}: returns {len(outputs)} numbers; the wiring has {count} outputs")
+    if not np.isfinite(outputs).all():
+        raise GslError(f"{where}: output {int(np.argmin(np.isfinite(outputs)))} is not finite")
+    return outputs
 
 
 class WiredEnv(gymnasium.Wrapper):

@@ -18,6 +18,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.random_choice import exploration
+from gsl.policies.outside import warn_of_wiring
 from gsl.policies.policy import neighbour, size
 from gsl.policies.programme import Piece, Programmed
 from gsl.real_robot.errand import Errand, Order, answer_parents, ask
@@ -74,6 +75,7 @@ class Collect:
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write one parquet file."""
         layout = self.world.layout
+        warn_of_wiring(self.policy, layout, console)
         policy = playing(self.policy, layout)
         scenario = Scenario(self.world, self.task, policy, self.role, exploration(self.action_noise, layout))
         pieces = policy.programme if isinstance(policy, Programmed) else self._pieces()

@@ -20,6 +20,7 @@ from gsl.core.trust import modules_in
 from gsl.core.unit import Unit
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
+from gsl.policies.outside import warn_of_wiring
 from gsl.policies.policy import size
 from gsl.real_robot.errand import Errand, Order, answer_parents, ask
 from gsl.report.evaluation_page import Look, write_evaluation_page
@@ -88,6 +89,7 @@ class Evaluate:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the table of all policies and the chosen one."""
+        warn_of_wiring(self.policy, self.world.layout, console)
         if getattr(self.world, "action_noise", 0.0):
             warn_uncharged(self.world, console, REAL, "the world's noise")
         thetas = records(self.policy, self.policies) if self.policies else [self._start]

@@ -19,6 +19,7 @@ from gsl.export.plain_json import export_json
 from gsl.export.servo_network import export_servo
 from gsl.export.urdf_dynamics import export_urdf
 from gsl.robots.catalogue import files
+from gsl.storage.artifact import LACKING
 from gsl.storage.trajectories import data_file, read
 from gsl.worlds.bullet import BulletWorld
 
@@ -60,6 +61,7 @@ class ExportStage:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the files."""
+        lacking: list[str] = []
         if self.format in WRITERS:
             assert self.trajectories is not None, "checked before"
             batch = read(data_file(self.trajectories))
@@ -69,7 +71,7 @@ class ExportStage:
             for name, contents in export.files.items():
                 data = contents if isinstance(contents, bytes) else contents.encode()
                 (folder / name).write_bytes(data)
-            missing = list(export.missing)
+            missing, lacking = list(export.missing), list(export.lacking)
         (folder / NOT_HELD).write_text("".join(f"{line}\n" for line in missing), encoding="utf-8")
         for line in missing:
             console.status(f"not held: {line}")
@@ -78,6 +80,7 @@ class ExportStage:
             "format": self.format,
             "files": [name for name in names if name not in _OWN and not name.startswith(".")],
             "not_held": missing,
+            LACKING: lacking,
         }
 
     def _simulator(self) -> Export:

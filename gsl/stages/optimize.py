@@ -21,6 +21,7 @@ from gsl.grounding.preparation import parents_of, without_margins
 from gsl.optimizers.candidates import check_candidates
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.optimizers.race import Race, Racing
+from gsl.policies.outside import warn_of_wiring
 from gsl.policies.policy import size
 from gsl.report.iteration_page import read_check
 from gsl.report.run_page import Change
@@ -86,6 +87,7 @@ class Optimize:
 
     def run(self, folder: Path, console: Console) -> Mapping[str, Any]:
         """Write the policies: π0, then one of each generation; and which of these is worth most in simulation."""
+        warn_of_wiring(self.policy, self.world.layout, console)
         first = PolicyChoice(self.policy, self.initial).parameters()
         bare = Scenario(self.world, self.task, self.policy, SIM, self.grounding)
         scenario, checked = check_grounding(bare, Gate(first, folder, console, self.accept, self.seed))

@@ -12,10 +12,10 @@ from gsl.core.console import Console
 from gsl.core.interfaces import Policy, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
-from gsl.errors import ConfigError
+from gsl.errors import ConfigError, GslError
 from gsl.policies.outside import Outside
 from gsl.policies.signals import UNITS
-from gsl.policies.wired import Eyes, Hands
+from gsl.policies.wired import Eyes, Hands, check_outputs
 from gsl.policies.wiring import Wiring, factors
 from gsl.policies.wiring_audit import Finding, audit
 
@@ -106,15 +106,19 @@ def _try_out(world: World, policy: Outside) -> Iterator[Finding]:
         yield Finding("ranges", f"{line}; the largest is {worst}: is its scale meant?", "policy.wiring.observation")
     else:
         yield Finding("ranges", line)
-    outputs = _answer(policy, seen)
+    try:
+        outputs = _answer(policy, seen, layout)
+    except GslError as error:
+        yield Finding("outputs", str(error), "policy", refused=True)
+        return
     yield _first_action(policy.wiring, layout, env, outputs)
     if not layout.choices:  # a small change seldom makes another choice
         yield _deaf(policy, seen, outputs, layout)
 
 
-def _answer(policy: Outside, seen: np.ndarray) -> np.ndarray:
+def _answer(policy: Outside, seen: np.ndarray, layout: Layout) -> np.ndarray:
     """Return the first outputs of an episode, shape (n_outputs,)."""
-    return np.asarray(policy.network().begin()(seen), dtype=float).ravel()
+    return check_outputs(policy.network().begin()(seen), policy.wiring, layout, policy.name)
 
 
 def _pose(wiring: Wiring, layout: Layout, env: gymnasium.Env) -> Iterator[Finding]:
@@ -150,7 +154,7 @@ def _deaf(policy: Outside, seen: np.ndarray, outputs: np.ndarray, layout: Layout
     deaf = []
     for k in range(len(seen)):
         changed = [seen + sign * np.eye(len(seen))[k] for sign in (1.0, -1.0)]
-        if all(np.array_equal(_answer(policy, other), outputs) for other in changed):
+        if all(np.array_equal(_answer(policy, other, layout), outputs) for other in changed):
             deaf.append(names[k % len(names)])
     if not deaf:
         return Finding("inputs", "every number that it sees changes what it does")

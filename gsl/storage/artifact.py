@@ -10,6 +10,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, ClassVar, Protocol
 
@@ -38,6 +39,8 @@ from gsl.storage.workplace import KEY, complete, hold_lock, install, log_to, sto
 
 CONFIG = "config.yaml"
 METRICS = "metrics.json"
+LACKING = "lacking"
+"""Among the metrics: the libraries for want of which a stage left something out, by the name to import."""
 
 
 class Stage(Protocol):
@@ -192,9 +195,10 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
         raise ArtifactError(out, "exists and is no artifact of gsl; move it away or choose another out=") from error
     damaged, same = manifest.find_damage(out, artifact.manifest), artifact.manifest.key == identity.key
     broken = None if damaged else broken_link(out, artifact.manifest)
-    if same and damaged is None and broken is None:
+    whole = same and damaged is None and broken is None
+    if whole and not _can_hold_more(artifact):
         return artifact
-    if force:
+    if whole or force:
         return None
     if damaged:
         problem = f"is damaged: {damaged} {manifest.describe_damage(out, damaged)}"
@@ -203,6 +207,12 @@ def _existing(out: Path, identity: Identity, config: Mapping[str, Any], *, force
     else:
         problem = f"is not whole any more: {broken}"
     raise ArtifactError(out, f"{problem}; force=true {forced}, another name= keeps both")
+
+
+def _can_hold_more(artifact: Artifact) -> bool:
+    """Return whether a library is here by now for want of which something was left out."""
+    names = artifact.metrics.get(LACKING)
+    return isinstance(names, list) and any(str(name).isidentifier() and find_spec(name) for name in names)
 
 
 def _work(

@@ -17,7 +17,7 @@ from gsl.core.body import Joint, Link, Robot
 from gsl.core.plant import Plant, nominal
 from gsl.core.slides import in_angles, in_metres, levers, power, unit_of_slide
 from gsl.core.trajectory import Batch, Trajectory
-from gsl.diagnosis.angles import effects_in_metres, with_log_in_angles
+from gsl.diagnosis.angles import effects_in_metres, say, with_log_in_angles
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.files import check_log
 from gsl.diagnosis.log.records import slope
@@ -115,6 +115,13 @@ def same(first: Plant, second: Plant) -> None:
 )  # fmt: skip
 def test_a_unit_says_how_a_number_goes_with_the_size_of_a_slide(unit: str, exponent: int, of_a_slide: str) -> None:
     assert (power(unit), unit_of_slide(unit)) == (exponent, of_a_slide)
+
+
+def test_one_number_for_hinges_and_slides_says_what_it_is_of_a_slide() -> None:
+    robot = in_angles(nominal(gantry())).robot
+    unit = "rad/(N·m)"
+    assert say(robot, robot.controlled, unit)[1] == f"{unit} (1 {unit} stands for 0.0004 to 0.0625 m/N of a slide)"
+    assert say(robot, robot.controlled[:2], "N·m")[1] == "N·m (1 N·m stands for 4 N of a slide)"
 
 
 SMALL: dict[str, Any] = {

@@ -305,6 +305,35 @@ def test_files_that_are_no_networks_are_one_line(tmp_path: Path) -> None:
     assert said.startswith("policy.function = act")
 
 
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        ("blank", "output 0 is not finite"),
+        ("two", "returns 2 numbers; the wiring has 1 outputs"),
+        ("nothing", "returns 0 numbers"),
+        ("word", "returns no array of numbers but str"),
+    ],
+)
+def test_a_function_that_returns_nonsense_is_refused_by_the_audit_and_by_an_episode(
+    function: str, said: str, tmp_path: Path
+) -> None:
+    answers = {"blank": [float("nan")], "two": [0.0, 0.0], "nothing": None, "word": "left"}
+    lines = [f"def {name}(seen):\n    return {answer!r}\n" for name, answer in answers.items()]
+    (tmp_path / "nonsense.py").write_text("nan = float('nan')\n" + "".join(lines))
+    base = ("world=inverted_pendulum", "policy=python", f"policy.function=nonsense:{function}")
+    audited = gsl("wiring", *base, folder=tmp_path)
+    assert audited.code == 2 and said in " ".join(audited.out.split())
+    assert said in gsl("collect", *base, "task=own_reward", "workers=1", folder=tmp_path).err
+
+
+def test_commands_point_out_another_order_of_joints(tmp_path: Path) -> None:
+    (tmp_path / "still.py").write_text("def act(seen):\n    return 6 * [0.0]\n")
+    order = "[Pitch,Rotation,Elbow,Wrist_Pitch,Wrist_Roll,Jaw]"
+    base = ("world=so101", "task=excite", "policy=python", "policy.function=still:act")
+    said = done("collect", *base, "episodes=1", "task.duration=1", f"policy.wiring.joints={order}", folder=tmp_path)
+    assert "warning: policy.wiring.observation.0.joints: position has Rotation where" in said.err
+
+
 def test_a_brought_policy_is_collected_with_searched_and_evaluated(network: Any, tmp_path: Path) -> None:
     base = ("world=inverted_pendulum", "task=own_reward", "policy=torch", "policy.file=net.pt", "workers=1", "name=net")
     done("collect", *base, "episodes=2", "neighbours=1", folder=tmp_path)

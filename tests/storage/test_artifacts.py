@@ -3,7 +3,7 @@ from __future__ import annotations
 import ctypes
 import errno
 import fcntl
-import importlib
+import importlib.util
 import json
 import logging
 import os
@@ -23,7 +23,7 @@ import pytest
 from gsl.commandline.failure import describe_failure
 from gsl.errors import ArtifactError, GslError
 from gsl.storage import hashing, manifest
-from gsl.storage.artifact import Artifact, build
+from gsl.storage.artifact import LACKING, Artifact, build
 from gsl.storage.documents import write_json
 from gsl.storage.identity import Identity, changes
 from gsl.storage.lineage import out_of_date
@@ -115,6 +115,23 @@ def test_the_same_work_is_not_done_twice_but_looks_fresh(out: Path) -> None:
     assert again.unchanged
     assert not stage.calls
     assert time.time() - (out / "manifest.json").stat().st_mtime < 60
+
+
+def test_what_was_left_out_for_want_of_a_library_is_made_when_it_is_there(
+    out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class Writer(Doubling):
+        def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
+            lacking = [] if importlib.util.find_spec("wanted") else ["wanted"]
+            return {**super().run(folder, console), LACKING: lacking}
+
+    assert built(Writer(), out).metrics[LACKING] == ["wanted"]
+    assert built(Writer(), out).unchanged
+    (tmp_path / "wanted.py").touch()
+    monkeypatch.syspath_prepend(tmp_path)
+    made = built(Writer(), out)
+    assert (made.unchanged, made.metrics[LACKING]) == (False, [])
+    assert built(Writer(), out).unchanged
 
 
 def test_only_a_component_has_workers_that_change_nothing(out: Path) -> None:
