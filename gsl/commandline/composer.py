@@ -24,8 +24,8 @@ from yaml import YAMLError
 
 from gsl.commandline.config_errors import Vocabulary, misshapen, shapeless, translate, unfit, unknown_key, unreadable
 from gsl.commandline.known_settings import list_keys, plain, read_declared, read_parts
-from gsl.commandline.overrides import COMMAND_KEYS, effect_path, file_of, key_of, rewrite
-from gsl.commandline.own_word import check_own_word, check_servos, find_own_modules, find_trust
+from gsl.commandline.overrides import COMMAND_KEYS, NAMES, effect_path, file_of, key_of, rewrite
+from gsl.commandline.own_word import check_own_word, check_servos, find_own_modules, find_trust, keep_text
 from gsl.commandline.plugins import folders, packages
 from gsl.commandline.yaml_files import USER, BudgetedFiles, check_folder, load_plugins
 from gsl.core.budget import within
@@ -113,6 +113,7 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
         overrides = _parse(rewrite(arguments, words.chosen), multirun)
         if choices := [_first_value(override) for override in overrides if _is_choice(override)]:
             words = replace(words, config=_without_hydra(_compose(command, choices, trust)))
+        overrides = [keep_text(override) if _takes_text(override, words.config) else override for override in overrides]
         signs = [_sign(override, words.config) for override in overrides]
         config = _compose(
             command, [sign + _first_value(override) for sign, override in zip(signs, overrides, strict=True)], trust
@@ -164,6 +165,8 @@ def _parse(overrides: Sequence[str], multirun: bool) -> list[Override]:
             together = f"a list is written '{key}=[{value}]'" if key not in LOGS else LOGS_TOGETHER
             more = f"; {together}" if read.is_choice_sweep() else ""
             raise ConfigError(key, f"several values need --multirun{more}")
+        if _is_choice(read):
+            parsed[-1] = read = keep_text(read)
         if _is_choice(read) and not (read.is_sweep_override() or isinstance(read.value(), str | list | dict)):
             raise ConfigError(key.rpartition("@")[2], "takes the name of a file", given=value)
     return parsed
@@ -203,6 +206,12 @@ def _check_made(command: str, composition: Composition) -> None:
 
 def _is_choice(override: Override) -> bool:
     return not override.is_delete() and override.key_or_group in groups()
+
+
+def _takes_text(override: Override, config: DictConfig) -> bool:
+    parent, _, name = override.key_or_group.rpartition(".")
+    declared = _find_declared(config, parent).get(name)
+    return override.key_or_group in NAMES or (declared is not None and declared.text)
 
 
 def _sign(override: Override, config: DictConfig) -> str:

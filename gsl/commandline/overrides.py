@@ -18,6 +18,7 @@ from gsl.errors import ConfigError, InputError
 EXECUTOR_KEYS = ("executor", "address")  # of commands that have workers
 COMMAND_KEYS = ("name", "out", "force", "trust", *EXECUTOR_KEYS)
 """Settings of the command, not of the stage; every command takes them, whether its yaml names them or not."""
+NAMES = ("name", "out")  # those of them that are texts, whatever they look like
 
 OPTIONAL_GROUPS = ("experiment", "grounding")
 """Groups a command may choose from without having a default."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import ChoiceSweep, QuotedString
+from hydra.core.override_parser.types import ChoiceSweep, Override, QuotedString
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -125,6 +125,14 @@ def find_own_modules(trust: Collection[str]) -> None:
     """Let modules of the current folder be imported once the user has named one; before that nothing in it is code."""
     if trust and os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
+
+
+def keep_text(override: Override) -> Override:
+    """Return an override that is read as it was typed where it looks like a number: a folder may be called 20."""
+    if override.is_delete() or override.is_sweep_override() or not isinstance(override.value(), int | float):
+        return override
+    key, _, typed = str(override.input_line).partition("=")
+    return OverridesParser.create().parse_override(f'{key}="{typed.strip()}"')
 
 
 def _split_words(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:

@@ -87,6 +87,7 @@ class Setting:
         upper: Upper end, likewise.
         most: Greatest possible value, or None.
         named: Whether it may be a mapping whose names nobody declares, such as the arguments of an environment.
+        text: Whether a single value of it is a text, whatever it looks like: a folder may be called 20.
     """
 
     name: str
@@ -98,6 +99,7 @@ class Setting:
     upper: float | None = None
     most: float | None = None
     named: bool = False
+    text: bool = False
 
     @property
     def neutral(self) -> float | None:
@@ -141,6 +143,7 @@ def _describe(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting:
         return Setting(parameter.name, default)
     if field.default_factory is not None:
         default = field.get_default(call_default_factory=True, validated_data={})
+    kinds = (field.annotation, *get_args(field.annotation))
     extra: Mapping[str, Any] = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
     return Setting(
         parameter.name,
@@ -151,7 +154,8 @@ def _describe(parameter: inspect.Parameter, field: FieldInfo | None) -> Setting:
         _first(extra.get("lower"), _bound(field, "ge"), _bound(field, "gt")),
         _first(extra.get("upper"), _bound(field, "le"), _bound(field, "lt")),
         _bound(field, "le"),
-        any(map(_maps_names, (field.annotation, *get_args(field.annotation)))),
+        any(map(_maps_names, kinds)),
+        str in kinds and not {int, float, bool, Any} & {*kinds},
     )
 
 

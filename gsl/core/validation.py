@@ -113,7 +113,8 @@ def _problem(details: ErrorDetails) -> str:
         return _RULES[details["type"]].format(**context)
     kind = _KINDS.get(details["type"].split("_")[0])
     if kind == "a text" and isinstance(details["input"], int | float):  # a folder called 20
-        return f"must be a text; in quotes inside those of the shell it is: '\"{_quote(details['input'])}\"'"
+        quoted = f'"{_quote(details["input"])}"'
+        return f"must be a text: {quoted} in a file, '{quoted}' in a shell"
     return f"must be {kind}" if kind else details["msg"][0].lower() + details["msg"][1:]
 
 

@@ -15,11 +15,11 @@ from gsl.core.validation import did_you_mean
 from gsl.errors import ConfigError
 from gsl.robots.defaults import armature_of, lone_servos, unknown_loads, with_gains
 from gsl.robots.frames import Mount, align
-from gsl.robots.joint_limits import is_range, limits_problem
+from gsl.robots.joint_limits import ENDS, FREE, is_endless, is_range, limits_problem
 from gsl.robots.mimic import Follows, leader_of, limits_like_leader
 from gsl.robots.urdf_xml import DRIVEN, TURNING, Description, Hinge
 
-ENDLESS = 2.0 * math.pi  # limit of a continuous joint, either way [rad]
+ENDLESS = 2.0 * math.pi  # limit of the commands of a continuous joint, either way [rad]
 
 Number = float | None
 
@@ -147,13 +147,12 @@ def _check(chosen: Mapping[str, JointSettings], held: Mapping[str, float], hinge
 
 def _make_driven(hinge: Hinge, settings: JointSettings) -> Joint:
     own = {"effort": settings.effort, "velocity": settings.velocity, "lower": settings.lower, "upper": settings.upper}
-    limit = hinge.limit
-    if hinge.kind == "continuous" and not is_range(limit, slides=False):  # a URDF need not say one then
-        limit = {**limit, "lower": -ENDLESS, "upper": ENDLESS}
-    limit = {**limit, **{key: value for key, value in own.items() if value is not None}}
+    limit = {**hinge.limit, **_turns(hinge), **{key: value for key, value in own.items() if value is not None}}
     if problem := limits_problem(limit, slides=hinge.slides):
         raise ConfigError(f"joints.{hinge.name}", problem)
     lower, upper = limit["lower"], limit["upper"]
+    if hinge.kind == "continuous" and settings.lower is None and settings.upper is None:
+        lower, upper = -FREE, FREE
     effort, velocity = limit["effort"], limit["velocity"]
     armature = armature_of(effort, velocity) if settings.armature is None else settings.armature
     origin, axis = hinge.origin, hinge.axis
@@ -161,11 +160,21 @@ def _make_driven(hinge: Hinge, settings: JointSettings) -> Joint:
     return Joint(*place, *limits, slides=hinge.slides)
 
 
+def _turns(hinge: Hinge) -> dict[str, float]:
+    """Return the range of the commands of a continuous joint, of which a URDF need not say one."""
+    if hinge.kind != "continuous":
+        return {}
+    own = {key: hinge.limit[key] for key in ENDS} if is_range(hinge.limit, slides=False) else {}
+    return own or {"lower": -ENDLESS, "upper": ENDLESS}
+
+
 def _soft(hinge: Hinge, joint: Joint, follows: Follows) -> dict[str, tuple[float, float]]:
     """Return the range that commands of a joint keep, by name; none where its <safety_controller> leaves it open."""
     ends = hinge.soft
-    if not ends or (not ends.get("lower") and not ends.get("upper")):  # 0 and 0 are the defaults: nothing is said
-        return {}
+    if not any(ends.values()):  # 0 and 0 are the defaults: nothing is said
+        if not is_endless(joint):
+            return {}
+        ends = _turns(hinge)
     own = (ends.get("lower", -math.inf), ends.get("upper", math.inf))
     lower, upper = sorted(follows.ratio * (end - follows.offset) for end in own)
     lower, upper = max(lower, joint.lower), min(upper, joint.upper)

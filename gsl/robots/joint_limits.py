@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from gsl.core.body import Joint
+
 ENDS = ("lower", "upper")  # of a range
 PLACEHOLDERS = {False: {"effort": 1e4, "velocity": 1e3}, True: {"effort": 1e6, "velocity": 1e2}}
 """What no joint of a robot reaches: [N·m], [rad/s] of those that turn; [N], [m/s] of those that slide."""
 BOUNDLESS = {False: 1e3, True: 1e2}  # an end of a range beyond this stands for none [rad], or [m] of a slide
+FREE = 1e6
+"""End of what can turn on and on [rad]: a wheel of a vehicle turns as far in ten hours at 28 rad/s."""
 MEANING = {
     False: {"effort": "peak torque [N·m]", "velocity": "speed without load [rad/s]"},
     True: {"effort": "peak force [N]", "velocity": "speed without load [m/s]"},
@@ -23,6 +27,11 @@ def is_range(limit: Mapping[str, float], *, slides: bool) -> bool:
     """Whether a range says where a joint can move."""
     far = BOUNDLESS[slides]
     return {*ENDS} <= set(limit) and -far < limit["lower"] < limit["upper"] < far
+
+
+def is_endless(joint: Joint) -> bool:
+    """Whether a joint turns on and on."""
+    return joint.upper - joint.lower > FREE
 
 
 def limits_problem(limit: Mapping[str, float], *, slides: bool) -> str:

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from gsl.core.body import MESH, Joint, Link, Robot, Shape
 from gsl.robots.frames import euler, rpy
+from gsl.robots.joint_limits import is_endless
 from gsl.robots.meshes import draw_parts, hull_of, write_stl
 
 _ALONG = {"x": (0.0, np.pi / 2, 0.0), "y": (np.pi / 2, 0.0, 0.0), "z": (0.0, 0.0, 0.0)}
@@ -102,18 +103,20 @@ def _attitude(shape: Shape) -> Sequence[float] | np.ndarray:
 
 def _add_joint(root: xml.Element, joint: Joint, soft: tuple[float, float] | None) -> None:
     fixed = joint.fixed_at is not None
-    kind = "fixed" if fixed else "prismatic" if joint.slides else "revolute"
+    endless = is_endless(joint)
+    kind = "fixed" if fixed else "prismatic" if joint.slides else "continuous" if endless else "revolute"
     node = xml.SubElement(root, "joint", name=joint.name, type=kind)
     xml.SubElement(node, "parent", link=joint.parent)
     xml.SubElement(node, "child", link=joint.child)
     turn = Rotation.from_rotvec(joint.axis * joint.fixed_at).as_euler("xyz") if fixed else (0.0, 0.0, 0.0)
     _origin(node, joint.origin, turn)
     xml.SubElement(node, "axis", xyz=_text(*joint.axis))
-    limit = {"lower": joint.lower, "upper": joint.upper, "effort": joint.effort, "velocity": joint.max_velocity}
+    ends = {} if endless else {"lower": joint.lower, "upper": joint.upper}
+    limit = {**ends, "effort": joint.effort, "velocity": joint.max_velocity}
     xml.SubElement(node, "limit", {name: _text(value) for name, value in limit.items()})
     if soft is not None:
-        ends = {"soft_lower_limit": _text(soft[0]), "soft_upper_limit": _text(soft[1])}
-        xml.SubElement(node, "safety_controller", {**ends, "k_velocity": "0"})
+        keep = {"soft_lower_limit": _text(soft[0]), "soft_upper_limit": _text(soft[1])}
+        xml.SubElement(node, "safety_controller", {**keep, "k_velocity": "0"})
 
 
 def _origin(

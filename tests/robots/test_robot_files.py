@@ -86,7 +86,7 @@ def test_what_is_left_open_is_derived_and_what_is_left_out_is_told() -> None:
     assert ours.controlled == ("turn", "shoulder", "elbow", FINGER) and dict(ours.coupled) == {"right_finger": FINGER}
     elbow = ours.joint("elbow")
     assert elbow.armature == pytest.approx(0.02 * 2.0 / 6.0) and ours.gains["elbow"][0] == pytest.approx(2.0 / 0.2)
-    assert ours.joint("turn").upper == pytest.approx(2.0 * np.pi)
+    np.testing.assert_allclose(ours.bound_commands("turn"), [-2.0 * np.pi, 2.0 * np.pi])
     remarks = " | ".join(ours.remarks)
     assert (
         "column.stl" in remarks

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
+from both_engines import PERIOD, in_bullet, window
 from commands import done, gsl, refused
 from robots_of_files import as_bullet_reads, holding
 
 from gsl.core.body import Robot, lump
 from gsl.core.dynamics import forward_kinematics
+from gsl.core.plant import nominal
+from gsl.core.trajectory import Batch, Trajectory
+from gsl.diagnosis.log.files import check_log
 from gsl.errors import InputError
 from gsl.policies.limits import limits
 from gsl.robots.catalogue import robot
 from gsl.robots.urdf import urdf
 from gsl.storage.trajectories import read
 from gsl.worlds.bullet import BulletWorld
+from gsl.worlds.held import Held
 
 SHORT = ("task=excite", "task.duration=1.6", "policy.repeats=1", "policy.motions=[steps_large]", "workers=1")
 BODY = (
@@ -205,6 +211,24 @@ def test_a_continuous_joint_needs_no_range_and_believes_no_placeholder(tmp_path:
     for ends in ("", "lower='0' upper='0'", "lower='-1e16' upper='1e16'"):
         body = of(tmp_path, joint("j1", "a", LIMIT.replace("lower='-1' upper='1'", ends), kind="continuous"))
         np.testing.assert_allclose(body.bound_commands("j1"), [-2.0 * np.pi, 2.0 * np.pi])
+
+
+def test_a_continuous_joint_turns_on_and_on_and_only_its_commands_have_ends(tmp_path: Path) -> None:
+    wheel = joint("j1", "a", LIMIT, kind="continuous").replace("<axis xyz='0 1 0'/>", "<axis xyz='0 0 1'/>")
+    follower = joint("j2", "b", LIMIT + "<mimic joint='j1' offset='0.5'/>", parent="a", kind="continuous")
+    body = of(tmp_path, wheel, follower)
+    assert body.bound_commands("j1") == (-1.0, 1.0)
+    (tmp_path / "back.urdf").write_text(urdf(body))
+    back = robot(str(tmp_path / "back.urdf"))
+    targets = 4.0 * PERIOD * np.arange(500)[:, None] * [1.0, 1.0]
+    driven = replace(lump(back), joints=tuple(replace(joint, armature=0.0) for joint in lump(back).joints))
+    plant = nominal(driven)
+    ours, theirs = Held.of(plant, 1e-3, PERIOD).replay(window(targets))[0], in_bullet(plant, targets, 1e-3)
+    assert ours[:, 0].max() > 39.0 and np.abs(ours - theirs).max() < 1e-4
+    rows = np.pad(targets, ((0, 1), (0, 0)), mode="edge")
+    time = PERIOD * np.arange(len(rows))
+    log = Trajectory(time, targets[:, :1], rows[:, :1], np.gradient(rows[:, :1], time, axis=0))
+    check_log(Batch((log,), ("j1",), PERIOD, {}), lump(body), "a log of it")
 
 
 def test_a_placeholder_in_a_robot_file_is_one_as_well(tmp_path: Path) -> None:

@@ -272,11 +272,18 @@ def test_a_mapping_that_is_named_without_its_ending_is_offered(tmp_path: Path) -
     assert refused("import", "source=log.csv", "mapping=m", folder=tmp_path).endswith("; yours is mapping=m.yaml")
 
 
-def test_a_folder_called_by_a_number_comes_with_its_quotes(tmp_path: Path) -> None:
-    line = refused("import", "source=20", mapping(tmp_path), folder=tmp_path)
-    assert line == "source = 20: must be a text; in quotes inside those of the shell it is: '\"20\"'"
-    line = refused("import", 'source="20"', mapping(tmp_path), folder=tmp_path)
-    assert line == "source = 20: there is no such file, folder or pattern"
+def test_folders_and_runs_may_be_called_by_numbers(tmp_path: Path) -> None:
+    for name in ("20", "2024_01", "1e3", "true"):
+        line = refused("import", f"source={name}", mapping(tmp_path), folder=tmp_path)
+        assert line == f"source = {name}: there is no such file, folder or pattern"
+        (tmp_path / name).mkdir()
+        plain_csv(tmp_path / name, TIME)
+        done("import", f"source={name}", f"name={name}", folder=tmp_path)
+        assert (tmp_path / f"runs/{name}/import/trajectories.parquet").is_file()
+        line = refused("audit", f"real={name}", f"sim={name}", folder=tmp_path)
+        assert line.startswith(f"no world called {name}")
+    line = refused("import", "source=20", mapping(tmp_path), "mapping.files={a: 20}", folder=tmp_path)
+    assert """a text: "20" in a file, '"20"' in a shell""" in line
 
 
 def test_a_lag_is_the_same_whenever_the_clock_began(tmp_path: Path) -> None:

@@ -191,6 +191,29 @@ def test_a_percentage_is_never_taken_for_degrees_nor_the_other_way_round(tmp_pat
     assert "a percentage ends at 100: are these degrees (mapping.angles=deg)?" in line
 
 
+def test_a_scale_that_the_encoders_steps_contradict_is_refused(tmp_path: Path) -> None:
+    write_data_set(tmp_path / "wave", "v3.0", recorded(percent))
+    for angles in ("deg", "rad"):
+        line = refused("import", "source=wave", f"mapping.angles={angles}", folder=tmp_path)
+        assert line == (
+            f"mapping.angles = {angles}: but Rotation has the steps of a percentage, of 2701 ticks; "
+            "leave mapping.angles out"
+        )
+    write_data_set(tmp_path / "turned", "v3.0", recorded(degrees))
+    line = refused("import", "source=turned", "mapping.angles=percent", folder=tmp_path)
+    assert line.endswith("has the steps of degrees; leave mapping.angles out")
+    line = refused("import", "source=turned", "mapping.angles=rad", folder=tmp_path)
+    assert "are these degrees (unit: deg)?" in line
+
+
+def test_rounded_degrees_of_another_robot_are_no_percentages(tmp_path: Path) -> None:
+    rounded = recorded(lambda ticks: np.round(0.6 * degrees(ticks), 1))
+    write_data_set(tmp_path / "wave", "v2.1", rounded, robot_type="mine")
+    line = refused("import", "source=wave", folder=tmp_path)
+    assert line.startswith("mapping.angles: nothing in the data set says whether its angles are degrees or percentages")
+    done("import", "source=wave", "mapping.angles=deg", "name=log", folder=tmp_path)
+
+
 def test_a_joint_that_rests_asks_for_the_calibration(tmp_path: Path) -> None:
     still = [(a, np.where(np.arange(6) == 3, q[:1], q)) for a, q in recorded(percent)]
     write_data_set(tmp_path / "wave", "v2.1", still)

@@ -17,6 +17,7 @@ TURN = 4095.0  # ticks that LeRobot counts to a turn
 STEP = 360.0 / TURN  # [degrees]
 RANGES = np.arange(200, 4096)  # ticks that a joint may be calibrated over
 ENOUGH, MOST = 30, 400  # different values: fewer fit some comb by chance, more add nothing
+DECIMALS = 1000.0  # of a unit: ranges on whose comb all numbers of three decimals lie tell no encoder
 OFF = 0.02  # of a step by which a value may be off; 32-bit numbers are off by 0.0002 at most
 
 
@@ -42,6 +43,11 @@ def find_range(values: np.ndarray, lowest: float) -> int | None:
     ticks = (some[None, :] - lowest) * (RANGES[:, None] / (100.0 - lowest))
     fitting = RANGES[np.abs(ticks - np.round(ticks)).max(axis=1) < OFF]
     return int(fitting[0]) if len(fitting) else None
+
+
+def is_telling(ticks: int) -> bool:
+    """Tell whether the steps of a range are an encoder's: degrees that were rounded to 0.1 lie on those of 2000."""
+    return bool(200.0 * DECIMALS % ticks)
 
 
 def _pick(values: np.ndarray) -> np.ndarray | None:

@@ -18,7 +18,7 @@ from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.signal import Signal, Time
 from gsl.storage.lerobot.arms import JAW_CLOSED, JAW_STROKE, OLD, OLD_ZEROS, OURS, bare, family, is_gripper, motor
 from gsl.storage.lerobot.dataset import ACTION, INFO, STATE, VELOCITY, DataSet
-from gsl.storage.lerobot.encoder_steps import STEP, find_range, on_degrees
+from gsl.storage.lerobot.encoder_steps import STEP, find_range, is_telling, on_degrees
 from gsl.storage.lerobot.episode_table import TIME, EpisodeTable
 
 BEYOND = 100.5  # a percentage is clipped to 100
@@ -136,6 +136,7 @@ def _scales(
     if mapping.angles is not None:
         kind: str = mapping.angles
         why = f"angles are in {mapping.angles}, as mapping.angles says"
+        _check_words(mapping.angles, {joint: values[joint] for joint in body})
     elif data.angles:
         kind, why = data.angles, f"angles are in {data.angles}, as the data set says"
     elif old:
@@ -205,13 +206,30 @@ def _recognise(values: Mapping[str, np.ndarray], arm: str | None, *, calibrated:
         return "deg", "angles are in degrees: their steps are those of an encoder of 4096 ticks in degrees"
     if calibrated:
         return "percent", "angles are percentages of the calibrated range, as nothing speaks for degrees"
-    if combs and any(find_range(own, -100.0) for own in values.values()):
+    if _find_telling(values):
         return "percent", "angles are percentages of the calibrated range: their steps are a range over 200"
     problem = (
         "nothing in the data set says whether its angles are degrees or percentages of each joint's range, "
         "-100 to 100; say mapping.angles=deg, or mapping.calibration=FILE (the arm's own, from LeRobot)"
     )
     raise ConfigError("mapping.angles", problem)
+
+
+def _find_telling(values: Mapping[str, np.ndarray]) -> dict[str, int]:
+    """Return the ranges by joint that no other scale explains [ticks]."""
+    ranges = {joint: find_range(own, -100.0) for joint, own in values.items() if not on_degrees(own)}
+    return {joint: ticks for joint, ticks in ranges.items() if ticks and is_telling(ticks)}
+
+
+def _check_words(angles: str, values: Mapping[str, np.ndarray]) -> None:
+    """Refuse a scale that the user has said and the encoders' steps contradict.
+
+    Raises:
+        ConfigError: They are those of a percentage.
+    """
+    for joint, ticks in _find_telling(values).items() if angles != "percent" else ():
+        problem = f"but {joint} has the steps of a percentage, of {ticks} ticks; leave mapping.angles out"
+        raise ConfigError("mapping.angles", problem, given=angles)
 
 
 def _check_percent(
@@ -227,6 +245,8 @@ def _check_percent(
                 "is a percentage of its range, and moves too little to tell which; say mapping.calibration=FILE "
                 "(LeRobot keeps one for each arm), or leave the joint out of mapping.joints"
             )
+            if on_degrees(values[joint]):
+                problem = "has the steps of degrees; leave mapping.angles out"
             raise TrajectoryError(data.folder, problem, column=joint)
 
 
