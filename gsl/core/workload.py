@@ -69,7 +69,7 @@ class Loop:
         """Note that `steps` more are done; without work if they were done before."""
         self._done += steps
         if worked and self._begun is None:
-            self._begun = self._work.worked()
+            self._begun = self._work.measure_work()
         elif worked:
             self._worked += steps
         self._work.step(steps, worked=worked)
@@ -84,7 +84,7 @@ class Loop:
 
     def words(self) -> list[str]:
         """Return how far it is, and how fast."""
-        passed = 0.0 if self._begun is None else self._work.worked() - self._begun
+        passed = 0.0 if self._begun is None else self._work.measure_work() - self._begun
         rate = self._worked / passed if passed > 0.0 else 0.0
         speed = f"{rate:.1f} a second" if rate >= 1.0 else f"{1.0 / rate:.1f} s each" if rate else ""
         return [f"{self._description}: {self._done} of {self._total}", speed]
@@ -108,7 +108,7 @@ class Workload:
         self._looking, self._looked = threading.Lock(), self.clock()
         self._compiling, self._compiled = False, 0.0
 
-    def worked(self) -> float:
+    def measure_work(self) -> float:
         """Return the clock without the time in which something was compiled [s], as far as somebody looked."""
         with self._looking:
             now, compiling = self.clock(), is_compiling()
@@ -122,7 +122,7 @@ class Workload:
         """Within, the work, or the present part of the plan around, consists of such parts."""
         if not self._plans:
             self._share = self._free = 0.0
-            self._begun = self._last = self.worked()
+            self._begun = self._last = self.measure_work()
             self.best, self._warm = "", False
         self._plans.append(Plan(noun, parts))
         try:
@@ -203,7 +203,7 @@ class Workload:
         if weight <= 0.0:
             return None
         whole = (self._last - self._begun + prior * seconds) / weight
-        passed = min(self.worked() - self._last, whole * (self._end() - self._share))
+        passed = min(self.measure_work() - self._last, whole * (self._end() - self._share))
         return max(0.0, whole * (1.0 - self._share) - passed)
 
     def _end(self) -> float:
@@ -230,7 +230,7 @@ class Workload:
             inside = plan.share(inside)
         moved = max(0.0, inside - self._share)
         self._share += moved
-        self._last = self.worked()
+        self._last = self.measure_work()
         if not (worked and self._warm):
             self._free += moved
         if worked and not self._warm:

@@ -137,10 +137,10 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
     if workers == 1 or joblib.effective_n_jobs(workers) == 1 or getattr(engine, "uses_threads", False):
         yield from ((index, function(frozen, jobs[index])) for index in missing)
         return
-    told = {"initializer": _begin_worker, "initargs": (os.getpid(), share_compilations())}
-    begin = told if isinstance(engine, LokyBackend) else {}
+    begin = {"initializer": _begin_worker, "initargs": (os.getpid(), share_compilations())}
+    more = begin if isinstance(engine, LokyBackend) else {}
     # Without max_nbytes=None joblib leaves a file for every large array.
-    parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **begin)
+    parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **more)
     try:
         with processes_starting():
             results = parallel(joblib.delayed(_run_numbered)(function, frozen, jobs[index], index) for index in missing)

@@ -104,10 +104,10 @@ def test_two_sides_stand_beside_each_other(walk, tmp_path: Path) -> None:
 
 def test_a_sheet_marks_the_command_over_time_and_says_the_conditions(walk, tmp_path: Path) -> None:
     plain = whole_sheet([Shot("a", "", walk, RED)], tmp_path / "plain.png")
-    told = whole_sheet([Shot("a", "", walk, RED, "nao_worn, forward 1 m/s, seed 1")], tmp_path / "told.png")
+    marked = whole_sheet([Shot("a", "", walk, RED, "nao_worn, forward 1 m/s, seed 1")], tmp_path / "marked.png")
     marks = (plain[-HEIGHT:] == 0).all(axis=(0, 2))
     assert np.count_nonzero(marks) == SHEET and np.ptp(np.diff(np.flatnonzero(marks))) <= 1
-    differs = np.split((plain != told).any(axis=2)[:-HEIGHT], SHEET // 2)
+    differs = np.split((plain != marked).any(axis=2)[:-HEIGHT], SHEET // 2)
     assert all(part[:40].any() and not part[40:].any() for part in differs), "once a moment, above the robot"
     assert describe_command(WalkEngine(left=-0.1)) == ["walk_engine", "forward 1 m/s", "left -0.1 m/s"]
 

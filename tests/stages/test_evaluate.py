@@ -73,8 +73,8 @@ def test_a_policy_that_falls_costs_no_further_episode_and_is_worth_nothing(three
 
 def test_the_page_shows_the_joints_and_feet_of_what_is_reported(three: tuple[dict, dict, Path]) -> None:
     text = (three[2] / "report.html").read_text("utf-8")
-    for told in ("Joint by joint: fast", "Joint by joint: π0", "fast on the real side", "π0 on the real side"):
-        assert told in text
+    for part in ("Joint by joint: fast", "Joint by joint: π0", "fast on the real side", "π0 on the real side"):
+        assert part in text
     assert "from real" not in text  # of no search, no simulator is told
     assert Page(text).tags["option"] == 2 * len(GROUND.layout.joints)
 

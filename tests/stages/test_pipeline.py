@@ -14,6 +14,7 @@ from gsl.commandline.rerun import rebuild
 from gsl.stages.effort import links
 from gsl.storage.artifact import Artifact
 from gsl.storage.manifest import read
+from gsl.storage.policy_choice import find_search
 
 pytestmark = pytest.mark.slow
 
@@ -148,6 +149,14 @@ def test_a_whole_iteration_builds_the_links_that_were_planned(whole: tuple[Path,
     iterate, _ = rebuild(Artifact(run / "iterate", read(run / "iterate")), ())
     built = [path for path in run.rglob("manifest.json") if path.parent.name != "iterate"]
     assert len(links(iterate)) == len(built) == 8
+
+
+def test_the_search_behind_a_policy_is_there_for_a_run_and_its_measurement(whole: tuple[Path, Said]) -> None:
+    run = whole[0] / "runs/whole"
+    for name in ("iterate", "iterate/policies.json", "iteration_01/evaluate", "iteration_01/optimize"):
+        search = find_search(run / name)
+        assert search and search.folder.resolve() == (run / "iteration_01/optimize").resolve()
+    assert find_search(run / "iteration_01/collect_real") is None and find_search(run / "iteration_01") is None
 
 
 def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[Path, Said]) -> None:
