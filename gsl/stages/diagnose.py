@@ -63,7 +63,7 @@ class Diagnose:
     nulls: Nulls = 3
     workers: Workers = -1
     tolerance: Tolerance = 0.0
-    limits: Annotated[bool, setting("ask how much of what is not named there may be all the same")] = True
+    limits: Annotated[bool, setting("ask how much of what is not named there may be all the same")] = False
     held_out: Annotated[
         Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
     ] = field(default_factory=dict)

@@ -66,7 +66,6 @@ class DiagnosisPlan:
                 most=self.most,
                 duels=self.duels,
                 nulls=self.nulls,
-                limits=False,
                 workers=workers,
                 seed=seed,
             )

@@ -97,7 +97,7 @@ def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
     log = gsl.run("collect", world="xl330_pendulum", task="excite", name="air", workers=1, **late)
     world = gsl.make_world("xl330_pendulum", period=0.02)
     others = sorted({*names()} - {"command_latency", "coulomb_friction"})  # examples/ diagnoses with all effects
-    sizes = {"most": 1, "duels": 0, "nulls": 1, "limits": False, "workers": 1}
+    sizes = {"most": 1, "duels": 0, "nulls": 1, "workers": 1}
     findings = gsl.diagnose(log.folder, world, without=others, **sizes)
     assert "command_latency" in findings.causes
     assert str(findings).startswith(f"{findings.verdict}: ")

@@ -90,6 +90,6 @@ def test_an_import_says_what_it_sees_and_mends_what_it_is_asked_to(tmp_path: Pat
 
 @pytest.mark.parametrize("stage", ["audit", "diagnose"])
 def test_the_same_log_gives_the_same_payload_again(stage: str, folder: Path) -> None:
-    few = () if stage == "audit" else ("most=1", "duels=0", "nulls=0", "limits=false")
+    few = () if stage == "audit" else ("most=1", "duels=0", "nulls=0")
     done(stage, "real=good", *SIM, f"name=twice_{stage}", *few, folder=folder)
     assert "differs" not in done("rerun", f"twice_{stage}/{stage}", "trust=blind_arm", folder=folder).out

@@ -42,7 +42,7 @@ TRIED = sorted(set(names()) - {"command_latency", "coulomb_friction"})
 SHRUNK = {
     "wiring": (),
     "collect": ("workers=1",),
-    "diagnose": ("most=1", "duels=0", "nulls=0", "limits=false", "workers=1", f"without={TRIED}"),
+    "diagnose": ("most=1", "duels=0", "nulls=0", "workers=1", f"without={TRIED}"),
     "evaluate": FEW,
     "optimize": ("preset=toy", "workers=1"),
     "iterate": (

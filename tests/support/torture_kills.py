@@ -51,7 +51,7 @@ KILLED = {
     "optimize": (*SMALL, "grounding=none"),
     "evaluate": ("policies=chain/optimize", *SMALL),
     "iterate": (*SMALL, "grounding=gat", "accept=true", "forward_model=linear"),
-    "diagnose": (*AIR, "most=1", "duels=0", "nulls=0", "limits=false"),
+    "diagnose": (*AIR, "most=1", "duels=0", "nulls=0"),
     "identify": (*AIR, "evaluations=160"),
     "audit": AIR[:2],
     "cross-validate": (*AIR, *FOLDED),
