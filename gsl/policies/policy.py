@@ -32,7 +32,9 @@ def size_to_search(policy: Policy, world: World) -> Policy:
     """
     sized = size(policy, world)
     if not len(sized.names):
-        problem = "has no parameters that a search could change, since it makes choices; take policy=sb3 for its weights"
+        problem = (
+            "has no parameters that a search could change, since it makes choices; take policy=sb3 for its weights"
+        )
         raise ConfigError("policy", problem, given=type(policy).__name__)
     return sized
 
