@@ -9,6 +9,7 @@ import numpy as np
 from gsl.core.interfaces import Policy, World
 from gsl.core.layout import Layout
 from gsl.core.setting import settings_of
+from gsl.errors import ConfigError
 
 
 @runtime_checkable
@@ -22,6 +23,21 @@ class Sized(Protocol):
 def size(policy: Policy, world: World) -> Policy:
     """Return a policy that knows its world, if it has to; only then has the world to say what it observes."""
     return policy.size_for(world.layout) if isinstance(policy, Sized) else policy
+
+
+def size_to_search(policy: Policy, world: World) -> Policy:
+    """Return a policy that knows its world and has something that a search can change.
+
+    Raises:
+        ConfigError: It has no parameters.
+    """
+    sized = size(policy, world)
+    if not len(sized.names):
+        problem = (
+            "has no parameters that a search could change, since it makes choices; take policy=sb3 for its weights"
+        )
+        raise ConfigError("policy", problem, given=type(policy).__name__)
+    return sized
 
 
 def neighbour(policy: Policy, parameters: np.ndarray, spread: float, rng: np.random.Generator) -> np.ndarray:

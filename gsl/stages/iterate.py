@@ -20,7 +20,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.grounding.preparation import MAKER, without_margins
 from gsl.models.config import ModelConfig
 from gsl.optimizers.objective import Objective, Quantile, check_objective
-from gsl.policies.policy import size
+from gsl.policies.policy import size_to_search
 from gsl.report.iteration import Rounds, write_curve, write_table
 from gsl.report.iteration_page import Seen, read_check, write_iteration_page
 from gsl.report.run_page import Change
@@ -85,7 +85,7 @@ class Iterate:
         if isinstance(self.sim, ExternalRobot):
             raise ConfigError("sim", "is a real robot, which cannot play the simulator's part")
         check_objective(self.objective, self.optimizer)
-        object.__setattr__(self, "policy", size(self.policy, self.sim))
+        object.__setattr__(self, "policy", size_to_search(self.policy, self.sim))
         layout = self.sim.layout
         check_alike(layout, self.real.layout)
         for name, model in {"forward_model": self.forward_model, "inverse_model": self.inverse_model}.items():

@@ -22,7 +22,7 @@ from gsl.optimizers.candidates import check_candidates
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.optimizers.race import Race, Racing
 from gsl.policies.outside import warn_of_wiring
-from gsl.policies.policy import size
+from gsl.policies.policy import size_to_search
 from gsl.report.iteration_page import read_check
 from gsl.report.run_page import Change
 from gsl.report.search_page import Winner, write_search_page
@@ -79,7 +79,7 @@ class Optimize:
     def __post_init__(self) -> None:
         """Tell the policy its world; refuse an objective that the optimiser does not know."""
         check_objective(self.objective, self.optimizer)
-        object.__setattr__(self, "policy", size(self.policy, self.world))
+        object.__setattr__(self, "policy", size_to_search(self.policy, self.world))
 
     def parents(self) -> Mapping[str, Path]:
         """Return the start policy and what the grounding is made of."""

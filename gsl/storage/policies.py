@@ -94,7 +94,7 @@ def _check(path: Path, policies: Policies) -> Policies:
 
 
 def _check_record(path: Path, record: PolicyRecord, first: PolicyRecord) -> None:
-    if not isinstance(record.name, str) or not isinstance(record.parameters, Mapping) or not record.parameters:
+    if not isinstance(record.name, str) or not isinstance(record.parameters, Mapping):
         raise ArtifactError(path, f"{record.name}: a policy needs a name and its parameters by name")
     if not isinstance(record.notes, Mapping) or type(record.generation) not in (int, type(None)):
         raise ArtifactError(path, f"{record.name}: its generation is no whole number, or its notes have no names")

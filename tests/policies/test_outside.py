@@ -326,6 +326,15 @@ def test_a_function_that_returns_nonsense_is_refused_by_the_audit_and_by_an_epis
     assert said in gsl("collect", *base, "task=own_reward", "workers=1", folder=tmp_path).err
 
 
+def test_a_network_that_makes_choices_is_evaluated_and_cannot_be_searched(tmp_path: Path) -> None:
+    (tmp_path / "choosing.py").write_text("def act(seen):\n    return [0.0]\n")
+    base = ("world=cliff_walking", "policy=python", "policy.function=choosing:act", "task=own_reward")
+    few = ("policies=null", "episodes=2", "check=2", "confirmation=2")
+    assert "pi0 alone was measured" in done("evaluate", *base, *few, folder=tmp_path).out
+    said = refused("optimize", *base, "grounding=none", folder=tmp_path)
+    assert said.startswith("policy = FunctionPolicy: has no parameters")
+
+
 def test_commands_point_out_another_order_of_joints(tmp_path: Path) -> None:
     (tmp_path / "still.py").write_text("def act(seen):\n    return 6 * [0.0]\n")
     order = "[Pitch,Rotation,Elbow,Wrist_Pitch,Wrist_Roll,Jaw]"
