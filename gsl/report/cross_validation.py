@@ -62,7 +62,7 @@ class Fold:
 
 
 def table(folds: Sequence[Fold], by: str, unit: str = "rad") -> str:
-    """Return the table, and below it how the diagnosis compares with the best of the others; `unit` is of the errors."""
+    """Return the table, and below it how the diagnosis compares with the best of the others; errors are in `unit`."""
     ways = list(folds[0].errors)
     columns = (f"{by} held out", *(f"{way} [m{unit}]" for way in ways), "excess removed", "with a servo law", "causes")
     rows = [

@@ -140,7 +140,7 @@ class CrossValidate:
         return {"folds": len(folds), "mean_error": means, "causes": {fold.held_out: fold.causes for fold in folds}}
 
     def _unit(self, log: Batch) -> tuple[float, str]:
-        """Return the factor that takes a mean error of all joints from angles to what a reader is told, and its unit."""
+        """Return what takes an error of all joints from angles to what a reader is told, and its unit."""
         return say(with_log_in_angles(log, self.sim.plant)[1].robot, log.joints, "rad")
 
     def _groups(self, log: Batch) -> list[list[Any]]:
@@ -208,7 +208,7 @@ class CrossValidate:
         return replace(log, episodes=tuple(log.episodes[k] for k in kept), metadata=about)
 
     def _errors(self, findings: Findings, held: Sequence[Record]) -> tuple[dict[str, list[float]], dict[str, Any]]:
-        """Return the mean absolute error of every held-out trajectory in angles by what replays it, and what servos say."""
+        """Return the mean absolute error of every held-out trajectory in angles, by what replays it, and its servos."""
         n = len(findings.log.joints)
         ways: dict[str, tuple[Mapping[str, Any], np.ndarray]] = {AS_IT_WAS: ({}, no_shifts(n))}
         fits = {CALIBRATED: findings.selection.none, _names(self.usual): _usual(findings, self.usual)}

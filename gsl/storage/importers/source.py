@@ -110,10 +110,11 @@ def _check_plain(source: str, mapping: LogMapping) -> None:
 def _check_bags(source: str, mapping: LogMapping) -> None:
     """Refuse bags whose topics nobody has named, among other files that are none of the log."""
     folder = Path(source)
-    if mapping.files is None and mapping.signals["position"].column == PLAIN and folder.is_dir() and not is_bag(folder):
-        if bags := sorted(path.name for path in folder.iterdir() if is_bag(path)):
-            problem = f"holds bags, such as {bags[0]}; {TOPICS}"
-            raise InputError(f"source = {source}: {problem}")
+    if mapping.files is not None or mapping.signals["position"].column != PLAIN or not folder.is_dir():
+        return
+    bags = sorted(path.name for path in folder.iterdir() if is_bag(path))
+    if bags and not is_bag(folder):
+        raise InputError(f"source = {source}: holds bags, such as {bags[0]}; {TOPICS}")
 
 
 def _short(folder: Path) -> str:
