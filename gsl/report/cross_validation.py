@@ -61,10 +61,10 @@ class Fold:
         return asdict(self)
 
 
-def table(folds: Sequence[Fold], by: str) -> str:
-    """Return the table, and below it how the diagnosis compares with the best of the others."""
+def table(folds: Sequence[Fold], by: str, unit: str = "rad") -> str:
+    """Return the table, and below it how the diagnosis compares with the best of the others; errors are in `unit`."""
     ways = list(folds[0].errors)
-    columns = (f"{by} held out", *(f"{way} [mrad]" for way in ways), "excess removed", "with a servo law", "causes")
+    columns = (f"{by} held out", *(f"{way} [m{unit}]" for way in ways), "excess removed", "with a servo law", "causes")
     rows = [
         (
             fold.held_out,

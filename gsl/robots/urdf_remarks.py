@@ -64,4 +64,4 @@ def _dynamics(root: xml.Element) -> list[str]:
 def _floating(root: xml.Element) -> Iterator[str]:
     for joint in root.findall("joint"):
         if joint.get("type") == "floating":
-            yield f"joint {joint.get('name', '')} is rigid here (floating): world.floating=true is what frees a base"
+            yield f"joint {joint.get('name', '')} is rigid here (floating): the base of a robot without feet is held"

@@ -17,7 +17,7 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.transitions import usable
 from gsl.core.workload import Part
-from gsl.diagnosis.angles import effects_in_metres, with_log_in_angles
+from gsl.diagnosis.angles import effects_in_metres, say, with_log_in_angles
 from gsl.diagnosis.diagnose import diagnose, prepare
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
@@ -135,9 +135,13 @@ class CrossValidate:
         with console.plan("fold", [Part()] * len(groups)):
             folds = [self._fold(log, *pair, console) for pair in zip(groups, after, strict=True)]
         documents.write_json(folder / DATA, [fold.document() for fold in folds])
-        (folder / TABLE).write_text(table(folds, self.by), encoding="utf-8")
+        (folder / TABLE).write_text(table(folds, self.by, self._unit(log)[1]), encoding="utf-8")
         means = {way: float(np.mean(np.concatenate([fold.replayed[way] for fold in folds]))) for way in folds[0].errors}
         return {"folds": len(folds), "mean_error": means, "causes": {fold.held_out: fold.causes for fold in folds}}
+
+    def _unit(self, log: Batch) -> tuple[float, str]:
+        """Return what takes an error of all joints from angles to what a reader is told, and its unit."""
+        return say(with_log_in_angles(log, self.sim.plant)[1].robot, log.joints, "rad")
 
     def _groups(self, log: Batch) -> list[list[Any]]:
         """Return what is held out together: each value alone, or every so many'th of them in order."""
@@ -182,6 +186,8 @@ class CrossValidate:
         console.status(f"{title}: {' '.join([findings.verdict.word, *causes])}")
         console.phase("replaying what was held out")
         errors, servos = self._errors(findings, _check(exp))
+        factor = say(findings.log.robot, findings.log.joints, "rad")[0]
+        errors = {way: [factor * error for error in own] for way, own in errors.items()}
         console.finish()
         return Fold(
             values=values,
@@ -202,7 +208,7 @@ class CrossValidate:
         return replace(log, episodes=tuple(log.episodes[k] for k in kept), metadata=about)
 
     def _errors(self, findings: Findings, held: Sequence[Record]) -> tuple[dict[str, list[float]], dict[str, Any]]:
-        """Return the mean absolute error of every held-out trajectory [rad] by what replays it, and what servos say."""
+        """Return the mean absolute error of every held-out trajectory in angles, by what replays it, and its servos."""
         n = len(findings.log.joints)
         ways: dict[str, tuple[Mapping[str, Any], np.ndarray]] = {AS_IT_WAS: ({}, no_shifts(n))}
         fits = {CALIBRATED: findings.selection.none, _names(self.usual): _usual(findings, self.usual)}

@@ -196,6 +196,7 @@ def test_a_table_says_what_it_leaves_out_of_its_means() -> None:
     assert "| 4.0 " in text and "| 2, 3 " in text and "in 1 of 1 trajectories" in text
     assert "5 of 6 trajectories are in no mean" in text
     assert "(as it was 4, usual 4, diagnosed 5; 4 in every replay)" in text
+    assert "usual [mrad]" in text and "usual [mm]" in table([fold], "day", "m")
 
 
 CAUSE = {"command_latency": {"delay": 0.016}}

@@ -246,6 +246,13 @@ def test_millimetres_are_told(commands: bool) -> None:
     assert finding["remedy"].startswith("Say unit: mm for ") and wiring.verdict == "wiring"
 
 
+def test_a_slide_that_wraps_wraps_by_metres() -> None:
+    first = np.array([True, False, False])
+    wiring = wired(lambda log: replace(log, position=np.where(first, log.position % 0.4, log.position)))
+    (finding,) = [finding for finding in wiring.signals if finding.kind == "wrap"]
+    assert re.match(r"jumps by its range \(0\.(38|39|4)\d* m\), .*: the position wraps", finding.problem)
+
+
 def test_an_offset_is_told_in_metres() -> None:
     (finding,) = wired(lambda episode: replace(episode, position=episode.position + [0.2, 0.0, 0.0])).document()[
         "findings"

@@ -94,4 +94,4 @@ def test_topics_of_a_bag_are_joined_by_time_and_joints_go_by_name(tmp_path: Path
     line = refused("import", "source=bag", "mapping=bag.yaml", folder=tmp_path)
     assert line == "bag: has no topic /cmds; its topics are /commands, /joint_states"
     line = refused("import", "source=bag", folder=tmp_path)
-    assert "needs a mapping that says file: TOPIC; its topics are /commands, /joint_states" in line
+    assert "in a mapping of your own `file` is the topic; its topics are /commands, /joint_states" in line

@@ -95,6 +95,17 @@ def test_a_bag_holds_states_and_commands_with_their_times(batch: Batch, tmp_path
         np.testing.assert_array_equal(np.column_stack([commands[name] for name in names]), episode.action)
 
 
+def test_bags_are_imported_again(batch: Batch, tmp_path: Path) -> None:
+    pytest.importorskip("rosbags")
+    place = export(tmp_path, "mcap")
+    line = refused("import", f"source={place}", folder=tmp_path)
+    assert line.startswith(f"source = {place}: holds bags, such as episode_000; mapping=ros reads /joint_commands")
+    line = refused("import", f"source={place}/episode_000", folder=tmp_path)
+    assert "needs a mapping; mapping=ros reads /joint_commands" in line
+    done("import", f"source={place}", "mapping=ros", "name=back", "accept=true", folder=tmp_path)
+    check_alike(read(tmp_path / "runs/back/import/trajectories.parquet"), batch, rows=1, precision=1e-9)
+
+
 @pytest.mark.filterwarnings("ignore")
 def test_minari_loads_its_data_set(batch: Batch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     minari = pytest.importorskip("minari")

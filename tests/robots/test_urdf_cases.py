@@ -256,12 +256,12 @@ def test_friction_of_a_file_becomes_effects_of_the_world_that_init_writes(tmp_pa
     }
 
 
-def test_a_floating_joint_is_the_base_that_a_world_may_free(tmp_path: Path) -> None:
+def test_a_floating_joint_is_a_base_that_is_held(tmp_path: Path) -> None:
     free = joint("free", "trunk", "", parent="base", kind="floating")
     body = of(tmp_path, free, joint("j1", "a", LIMIT, parent="trunk"))
     rigid = of(tmp_path, free.replace("floating", "fixed"), joint("j1", "a", LIMIT, parent="trunk"))
     assert body.controlled == ("j1",) and lump(body).links.keys() == lump(rigid).links.keys()
-    assert any("joint free is rigid here (floating)" in remark for remark in body.remarks)
+    assert any("free is rigid here (floating): the base of a robot without feet is held" in it for it in body.remarks)
 
 
 TWICE = {

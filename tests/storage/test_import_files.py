@@ -218,6 +218,9 @@ def test_a_clock_too_coarse_is_not_mended_by_dropping_most_rows(tmp_path: Path) 
     line = refused("import", "source=log.csv", folder=tmp_path)
     assert "the clock is too coarse for so many rows" in line and "mapping.time.period=0.01" in line
     assert "drop" not in line
+    plain_csv(tmp_path, np.floor(TIME / 0.16 + 0.4))  # ticks that the log's ends cut off do not count
+    assert "mapping.time.period=0.0625 if" in refused("import", "source=log.csv", folder=tmp_path)
+    plain_csv(tmp_path, np.floor(TIME / 0.1) * 0.1)
     done("import", "source=log.csv", "mapping.time.period=0.01", "name=log", folder=tmp_path)
     check_same(read(tmp_path / "runs/log/import/trajectories.parquet"))
 

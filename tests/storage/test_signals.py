@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 import pytest
@@ -61,8 +62,8 @@ def frozen(x: np.ndarray) -> np.ndarray:
     return np.r_[x[:100], np.full(len(x) - 100, x[100])]
 
 
-def stale(x: np.ndarray) -> np.ndarray:
-    return x[np.arange(len(x)) // 2 * 2]
+def stale(x: np.ndarray, rows: int = 2) -> np.ndarray:
+    return x[np.arange(len(x)) // rows * rows]
 
 
 def test_a_log_in_order_has_no_findings() -> None:
@@ -123,7 +124,9 @@ def test_a_position_that_is_another_joints_is_a_copy_unless_both_are_commanded_a
 def test_frozen_and_stale_positions_are_seen() -> None:
     (finding,) = check_signals(log(position=column(0, frozen)), JOINTS)
     assert (finding.kind, finding.joints, finding.row) == ("frozen", ("shoulder",), 100)
-    assert kinds(log(position=column(0, stale))) == [("stale", ("shoulder",))]
+    for rows, ordinal in ((2, "second"), (3, "third")):
+        (finding,) = check_signals(log(position=column(0, partial(stale, rows=rows))), JOINTS)
+        assert (finding.kind, finding.joints) == ("stale", ("shoulder",)) and f"every {ordinal} row" in finding.problem
 
 
 def test_a_joint_at_its_stop_and_one_that_sticks_are_not_frozen() -> None:

@@ -112,7 +112,7 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
     batch = _in_order(batch, robot.controlled)
     ways = tuple(levers(robot)[: len(robot.controlled)].tolist())
     channels = Channels(batch.joints, batch.control_period, ways)
-    signals = check_signals(batch.episodes, batch.joints)
+    signals = check_signals(batch.episodes, batch.joints, {name: robot.joint(name).lever for name in robot.slides})
     mended = replace(batch, episodes=tuple(mend_signals(batch.episodes)))
     spoiled = {
         joint

@@ -15,6 +15,7 @@ from gsl.storage.importers.sizes import check_need
 from gsl.storage.importers.table import numbers
 
 STAMP = "time"
+TOPICS = "mapping=ros reads /joint_commands and /joint_states, in a mapping of your own `file` is the topic"
 LONG = 3600.0  # of CPU: a bag of hours is no attack, one whose messages unpack to more than the memory is
 NANOSECOND = 1e-9
 
@@ -58,7 +59,7 @@ class BagTable:
                 chosen = [connection for connection in bag.connections if connection.topic == self.topic]
                 if not chosen:
                     there = ", ".join(sorted({connection.topic for connection in bag.connections})) or "none"
-                    problem = f"has no topic {self.topic}" if self.topic else "needs a mapping that says file: TOPIC"
+                    problem = f"has no topic {self.topic}" if self.topic else f"needs a mapping; {TOPICS}"
                     raise TrajectoryError(self.path, f"{problem}; its topics are {there}")
                 for connection in chosen:
                     if connection.msgtype not in bag.typestore.fielddefs:

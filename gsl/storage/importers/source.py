@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from gsl.errors import ConfigError, InputError
+from gsl.storage.importers.bag_table import TOPICS
+from gsl.storage.importers.formats import is_bag
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, places
 from gsl.storage.lerobot.dataset import INFO, STATE, DataSet, find_data_set, is_data_set, open_data_set
@@ -57,6 +59,7 @@ def look_at(source: str, mapping: LogMapping, memory: float) -> Source:
             [Place(f"{name}/{episode.name}", {"": episode.file}, episode) for episode in data.episodes], mapping, notes
         )
     _check_plain(source, mapping)
+    _check_bags(source, mapping)
     return Source(places(source, mapping.files, mapping.records), mapping, [])
 
 
@@ -102,6 +105,16 @@ def _check_plain(source: str, mapping: LogMapping) -> None:
             f"holds {len(sets)} LeRobot data sets; say one" if len(sets) > 1 else "holds a LeRobot data set; say it"
         )
         raise InputError(f"source = {source}: {problem}: source={sets[0]}")
+
+
+def _check_bags(source: str, mapping: LogMapping) -> None:
+    """Refuse bags whose topics nobody has named, among other files that are none of the log."""
+    folder = Path(source)
+    if mapping.files is not None or mapping.signals["position"].column != PLAIN or not folder.is_dir():
+        return
+    bags = sorted(path.name for path in folder.iterdir() if is_bag(path))
+    if bags and not is_bag(folder):
+        raise InputError(f"source = {source}: holds bags, such as {bags[0]}; {TOPICS}")
 
 
 def _short(folder: Path) -> str:

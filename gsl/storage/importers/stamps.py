@@ -101,6 +101,8 @@ def _advise(stamps: np.ndarray, twice: int) -> str:
     """Return what to do about repeated stamps; where there are many, the rows are right and the clock is coarse."""
     if twice <= COARSE * len(stamps):
         return "mapping.duplicates=drop leaves them out"
-    period = float(stamps[-1] - stamps[0]) / (len(stamps) - 1)
+    changes = np.flatnonzero(np.diff(stamps) > 0.0) + 1  # before the first and after the last a tick is cut off
+    changes = changes if len(changes) > 1 else np.array([0, len(stamps) - 1])
+    period = float(stamps[changes[-1]] - stamps[changes[0]]) / int(changes[-1] - changes[0])
     even = f"mapping.time.period={period:.4g} if they are evenly spaced" if period > 0.0 else "log a clock that runs"
     return f"the clock is too coarse for so many rows: log finer stamps, or say {even}"

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -17,14 +18,17 @@ from gsl.storage.signals.velocities import find_velocities
 from gsl.storage.signals.wraps import find_turns, find_wraps, join
 
 
-def check_signals(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
+def check_signals(
+    episodes: Sequence[Trajectory], joints: Sequence[str], levers: Mapping[str, float] = MappingProxyType({})
+) -> list[Finding]:
     """Return what looks wrong with the signals of a log.
 
     Args:
         episodes: Trajectories of the same joints, in the contract's units.
         joints: Names, in order.
+        levers: Metres in a unit of the joints that are known to slide.
     """
-    wraps = find_wraps(episodes, joints)
+    wraps = find_wraps(episodes, joints, levers)
     whole = join_turns(episodes) if wraps else episodes
     checks = (find_glitches, find_copies, find_stuck, find_velocities)
     findings = [*wraps, *(finding for check in checks for finding in check(whole, joints))]

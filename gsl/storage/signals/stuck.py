@@ -75,9 +75,10 @@ def _still(episodes: Sequence[Trajectory]) -> Iterator[Place]:
 def _stale(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
     findings = []
     for k, joint in enumerate(joints):
-        share = _share_repeated([episode.position[:, k] for episode in episodes])
-        if share > REPEATED:
-            rows = 1.0 / (1.0 - min(share, 0.99))
+        channels = [episode.position[:, k] for episode in episodes]
+        if _share_repeated(channels) > REPEATED:
+            runs = np.concatenate([np.diff(np.flatnonzero(np.diff(channel))) for channel in channels])
+            rows = max(2.0, float(np.median(runs)) if len(runs) else 2.0)  # rests are few runs, however long
             problem = f"is read anew in every {_ordinal(rows)} row only and repeats itself between"
             remedy = "log at the rate of the sensors (mapping.period resamples), or read them in every row"
             findings.append(Finding("stale", (f"position.{joint}",), (joint,), problem, remedy))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from types import MappingProxyType
 
 import numpy as np
 
@@ -18,16 +19,21 @@ OWN = 0.5  # share of a jump that its command may move around it: more is a jump
 AROUND = 3  # rows before a jump in which its command may have asked for it
 
 
-def find_wraps(episodes: Sequence[Trajectory], joints: Sequence[str]) -> list[Finding]:
-    """Return the positions and commands that wrap."""
+def find_wraps(
+    episodes: Sequence[Trajectory], joints: Sequence[str], levers: Mapping[str, float] = MappingProxyType({})
+) -> list[Finding]:
+    """Return the positions and commands that wrap; `levers` are the metres in a unit of the joints that slide."""
     findings = []
     for signal in ("position", "action"):
         places = [place for place, _ in _wraps(episodes, signal)]
         turns = {place.joint: turn for place, turn in _wraps(episodes, signal)}
         for finding in per_joint("wrap", signal, places, joints, "", "mapping.unwrap=true joins the turns"):
             size = turns[joints.index(finding.joints[0])]
-            by = "a turn" if abs(size - TURN) < 1e-9 else f"its range ({size:.3g} rad)"
-            findings.append(finding._replace(problem=f"jumps by {by}, {count(finding.times)}: the angle wraps"))
+            way = levers.get(finding.joints[0])
+            range_text = f"its range ({size:.3g} rad)" if way is None else f"its range ({size * way:.3g} m)"
+            by = "a turn" if way is None and abs(size - TURN) < 1e-9 else range_text
+            what = "angle" if way is None else "position"
+            findings.append(finding._replace(problem=f"jumps by {by}, {count(finding.times)}: the {what} wraps"))
     return findings
 
 
