@@ -339,7 +339,8 @@ def test_commands_point_out_another_order_of_joints(tmp_path: Path) -> None:
     (tmp_path / "still.py").write_text("def act(seen):\n    return 6 * [0.0]\n")
     order = "[Pitch,Rotation,Elbow,Wrist_Pitch,Wrist_Roll,Jaw]"
     base = ("world=so101", "task=excite", "policy=python", "policy.function=still:act")
-    said = done("collect", *base, "episodes=1", "task.duration=1", f"policy.wiring.joints={order}", folder=tmp_path)
+    few = ("episodes=1", "task.duration=1", "workers=1")
+    said = done("collect", *base, *few, f"policy.wiring.joints={order}", folder=tmp_path)
     assert "warning: policy.wiring.observation.0.joints: position has Rotation where" in said.err
 
 
