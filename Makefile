@@ -54,7 +54,7 @@ logs-of-so101: $(INSTALLED)
 so101: logs-of-so101
 	$(GSL) diagnose real=so101 sim=so101 name=so101 'held_out={motion: [$(CHECKED)]}'
 	$(GSL) cross-validate real=so101 sim=so101 name=so101 by=date
-	$(GSL) cross-validate real=so101 sim=so101 name=so101_motions by=motion folds=4
+	$(GSL) cross-validate real=so101 sim=so101 name=so101_motions by=motion folds=4 servo=true
 
 menagerie: logs-of-so101
 	$(GSL) diagnose real=so101 sim=so101_menagerie name=so101_menagerie 'held_out={motion: [$(CHECKED)]}'
