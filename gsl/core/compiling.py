@@ -15,7 +15,7 @@ _marks: Scratch | None = None  # of the workers of this process
 
 def is_compiling() -> bool:
     """Whether a function is being compiled, here or in a worker; loading one from the cache on disk does not count."""
-    return _running > 0 or (_marks is not None and any(map(_is_alive, os.listdir(_marks.name))))
+    return _running > 0 or any(map(_is_alive, _list_marks()))
 
 
 def count_compilation(change: int) -> None:
@@ -40,9 +40,16 @@ def report_to(folder: str) -> None:
     _mark = Path(folder, str(os.getpid()))
 
 
+def _list_marks() -> list[str]:
+    try:
+        return os.listdir(_marks.name) if _marks else []
+    except FileNotFoundError:  # somebody has tidied up the system's temporary folder
+        return []
+
+
 def _is_alive(process: str) -> bool:
     try:
         os.kill(int(process), 0)
-    except ProcessLookupError:  # it was killed while it compiled
+    except OSError:  # it was killed while it compiled, and its number may be another user's by now
         return False
     return True

@@ -126,11 +126,11 @@ class Evaluate:
         first, chosen = (vector(self.policy, thetas[index]).tolist() for index in (0, best))
         change = Change(self.policy.names, first, chosen, self.policy.scale.tolist())
         console.phase("drawing the page")
-        look = self._look_at([(thetas[index], fresh[index]) for index in dict.fromkeys((best, 0))])
+        look = self._look_at([(thetas[index], fresh[index]) for index in dict.fromkeys((best, 0))], console)
         write_evaluation_page(folder, metrics, document, change, Unit.of(self.task), look)
         return metrics
 
-    def _look_at(self, reported: Sequence[tuple[PolicyRecord, Sequence[Episode]]]) -> Look:
+    def _look_at(self, reported: Sequence[tuple[PolicyRecord, Sequence[Episode]]], console: Console) -> Look:
         """Return what there is to see of the reported policies: an episode of each is played once more."""
         walks = {}
         for theta, done in reported:
@@ -138,7 +138,7 @@ class Evaluate:
             seed = derive_seed(self.seed, self.kind, _REPORT, theta.name, shown)
             walks[BEGUN.get(theta.name, theta.name)] = vector(self.policy, theta), seed
         source = resolve(self.policies) if self.policies else None
-        return look_at(self._scenario, walks, source, modules_in(describe(self)))
+        return look_at(self._scenario, walks, source, modules_in(describe(self)), console)
 
     @property
     def _scenario(self) -> Scenario:

@@ -23,12 +23,17 @@ EVALUATION = "evaluation.json"  # of policies that were measured
 
 
 def find_search(place: Path) -> Artifact | None:
-    """Return the search whose policies a folder or file holds or a run has measured, None where it is of none."""
+    """Return the search whose policies a folder or file holds or a run has measured, None where it is of none.
+
+    Raises:
+        ArtifactError: What leads to it is incomplete, or a file of it is missing or was changed.
+    """
     home = place if place.is_dir() else place.parent
     if not (home / manifest.NAME).is_file():
         return None
     made = manifest.read(home)
     if made.kind == "optimize":
+        manifest.check_intact(home, made)
         return Artifact(home, made)
     above = [home / parent.path for parent in made.parents if made.kind == "evaluate" and parent.role == "policies"]
     above += [find_measurement(home)] if made.kind == "iterate" else []
@@ -39,9 +44,11 @@ def find_measurement(run: Path) -> Path:
     """Return the measurement whose policy a run returned, the last one otherwise.
 
     Raises:
-        ArtifactError: It has measured none.
+        ArtifactError: It has measured none, or what it returned is not as it was written.
     """
-    places = [run / link.path for link in manifest.read(run).links if link.role == "evaluate"]
+    made = manifest.read(run)
+    manifest.check_intact(run, made, (FILE,))
+    places = [run / link.path for link in made.links if link.role == "evaluate"]
     grounded = [place for place in places if place.name == "evaluate"] or places
     if not grounded:
         raise ArtifactError(run, "has measured no policy that could be shown")

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from gsl.commandline.rebuild import rebuild_search
-from gsl.core.layout import Layout
+from gsl.core.console import Console
+from gsl.core.layout import Layout, check_alike
 from gsl.core.observation import missing
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
@@ -24,10 +25,15 @@ from gsl.validation.iteration_pictures import Way, centre, read_footfalls, show_
 from gsl.validation.replay import PAST
 
 SHORTEST = 2 * PAST  # ticks of a walk whose joints are shown: where it fell at once there is no state to begin in
+_ALONE = "the page shows no simulator"
 
 
 def look_at(
-    real: Scenario, walks: Mapping[str, tuple[np.ndarray, int]], source: Path | None, trust: Sequence[str]
+    real: Scenario,
+    walks: Mapping[str, tuple[np.ndarray, int]],
+    source: Path | None,
+    trust: Sequence[str],
+    console: Console,
 ) -> Look:
     """Return what there is to see of policies; nothing of a robot that is elsewhere, or of what is no robot.
 
@@ -36,8 +42,9 @@ def look_at(
         walks: Parameters and seed of the episode that is shown, by the name of the policy; the best one first.
         source: Where the policies come from.
         trust: Modules that are not gsl's and whose classes settings may name.
+        console: Hears why no simulator is shown where there was a search.
     """
-    body, searched = centre(real.world), _find(source)
+    body, searched = centre(real.world), _find(source, console)
     check = searched.folder / REPORT if searched else None
     if body is None:
         return Look(check=check)
@@ -47,13 +54,15 @@ def look_at(
     try:
         if searched:
             plain, grounded = rebuild_search(searched, trust)
+            check_alike(plain.world.layout, body.layout)  # a step of another length would be replayed as another motion
             ways = [Way(simulator, NoGrounding())] if (simulator := centre(plain.world)) else []
             if ways and not isinstance(plain.grounding, NoGrounding) and (inner := centre(grounded.world)):
                 ways.append(Way(inner, grounded.grounding))
             name, walk = next(iter(walks.items()))
             where = "in the grounded simulator" if len(ways) > 1 else "in simulation"
             steps.append(read_footfalls(f"{name} {where}", walk_once(grounded, *walk)))
-    except GslError:  # the search is gone, or its settings name code that nobody has trusted here
+    except GslError as error:  # it is of another rate, or its settings name code that nobody has trusted here
+        console.status(f"{_ALONE}: {error}")
         ways = []
     slides = body.plant.robot.slides
     long = {name: walk for name, walk in episodes.items() if len(walk) >= SHORTEST}
@@ -61,10 +70,11 @@ def look_at(
     return Look(traces, [step for step in steps if step], check)
 
 
-def _find(source: Path | None) -> Artifact | None:
+def _find(source: Path | None, console: Console) -> Artifact | None:
     try:
         return find_search(source) if source else None
-    except GslError:  # what the policies were measured in is gone
+    except GslError as error:  # what the policies were measured in is damaged
+        console.status(f"{_ALONE}: {error}")
         return None
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import itertools
+import os
+from pathlib import Path
 
 import pytest
 
-from gsl.core.compiling import count_compilation
+from gsl.core.compiling import count_compilation, is_compiling, share_compilations
 from gsl.core.workload import Part, Workload
 
 
@@ -134,6 +136,17 @@ def test_compilation_is_said_in_place_of_the_time_left_and_is_no_pace() -> None:
         clock.now += 10.0
         loop.advance()
         assert load.text() == "50 % done, about 20 s left; stage 1 of 2, collecting: 2 of 2, 10.0 s each"
+
+
+def test_a_temporary_folder_that_was_tidied_up_ends_no_display() -> None:
+    folder = Path(share_compilations())
+    folder.rmdir()
+    assert not is_compiling()
+    folder.mkdir()
+    stranger = folder / "1"  # of another user, where this is not run by root
+    stranger.touch()
+    assert is_compiling() == (os.geteuid() == 0)
+    stranger.unlink()
 
 
 def test_a_phase_has_its_own_clock_until_a_loop_or_a_part_says_more() -> None:

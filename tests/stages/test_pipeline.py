@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 from browser import check_seen
@@ -157,6 +158,21 @@ def test_the_search_behind_a_policy_is_there_for_a_run_and_its_measurement(whole
         search = find_search(run / name)
         assert search and search.folder.resolve() == (run / "iteration_01/optimize").resolve()
     assert find_search(run / "iteration_01/collect_real") is None and find_search(run / "iteration_01") is None
+
+
+def test_a_search_that_is_damaged_or_of_another_rate_costs_the_page_its_simulator_and_no_measurement(
+    chain: Path, tmp_path: Path
+) -> None:
+    copytree(chain / "runs/chain", tmp_path / "runs/chain")
+    fresh = ("evaluate", *SMALL, "episodes=1", "check=1", "confirmation=2")
+    said = done(*fresh, "name=finer", "policies=runs/chain/optimize", "world.period=0.01", folder=tmp_path)
+    assert "the page shows no simulator: real: acts every 0.01 s" in said.err
+    (tmp_path / "runs/chain/optimize/grounding.json").write_text("{")
+    said = done(*fresh, "name=again", "policies=runs/chain/evaluate", folder=tmp_path)
+    assert "the page shows no simulator: " in said.err and "optimize/grounding.json: is not as the manifest" in said.err
+    for name in ("finer", "again"):
+        text = (tmp_path / "runs" / name / "evaluate/report.html").read_text("utf-8")
+        assert "Joint by joint" in text and "from real" not in text
 
 
 def test_the_pages_of_an_iteration_have_the_figures_of_its_results(whole: tuple[Path, Said]) -> None:
