@@ -9,6 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from gsl.core.setting import component, setting
+from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.policies.outside import File, Joints, Network, OutsideFile, Ports, read_once
 from gsl.policies.wired import Answer
@@ -72,7 +73,7 @@ class Graph:
             try:
                 outputs = self._session.run(None, {self._input.name: observation.astype(np.float32)[None], **memory})
             except Exception as error:
-                problem = f"cannot take {len(observation)} numbers: {' '.join(str(error).split())[:120]}"
+                problem = f"cannot take {several(len(observation), 'number')}: {' '.join(str(error).split())[:120]}"
                 raise ConfigError("policy.wiring.observation", problem, given=self._where) from error
             memory.update(zip(memory, outputs[1:], strict=False))
             return np.asarray(outputs[0])

@@ -14,6 +14,7 @@ import numpy as np
 
 from gsl.core.budget import NETWORK_BYTES, open_file
 from gsl.core.setting import component, setting
+from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.policies.outside import File, Joints, Network, OutsideFile, Ports, read_once
 from gsl.policies.wired import Answer
@@ -85,7 +86,7 @@ class TorchScript:
             try:
                 outputs = self._module(self._torch.from_numpy(observation.astype(np.float32)[None]))
             except RuntimeError as error:
-                problem = f"cannot take {len(observation)} numbers: {_last_line(error)}"
+                problem = f"cannot take {several(len(observation), 'number')}: {_last_line(error)}"
                 raise ConfigError("policy.wiring.observation", problem, given=self._where) from error
             return np.asarray((outputs[0] if isinstance(outputs, tuple) else outputs).numpy())
 

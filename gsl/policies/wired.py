@@ -10,6 +10,7 @@ import gymnasium
 import numpy as np
 
 from gsl.core.layout import Layout
+from gsl.core.words import several
 from gsl.errors import GslError
 from gsl.policies.signals import Episode
 from gsl.policies.wiring import Wiring, factors
@@ -119,7 +120,7 @@ def check_outputs(answer: np.ndarray, wiring: Wiring, layout: Layout, where: str
     """
     outputs, count = np.asarray(answer, dtype=float).ravel(), wiring.outputs(layout)
     if len(outputs) != count and not (layout.choices and len(outputs) == 1):  # a choice may be one number
-        raise GslError(f"{where}: returns {len(outputs)} numbers; the wiring has {count} outputs")
+        raise GslError(f"{where}: returns {several(len(outputs), 'number')}; the wiring has {several(count, 'output')}")
     if not np.isfinite(outputs).all():
         raise GslError(f"{where}: output {int(np.argmin(np.isfinite(outputs)))} is not finite")
     return outputs

@@ -11,6 +11,7 @@ import numpy as np
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean
+from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.policies.signals import (
     Episode,
@@ -159,7 +160,9 @@ def factors(scale: Numbers, count: int, where: str) -> np.ndarray:
     """
     values = np.atleast_1d(np.asarray(scale, dtype=float))
     if len(values) not in (1, count):
-        raise ConfigError(where, f"has {len(values)} factors for {count} numbers; give one, or one for each")
+        raise ConfigError(
+            where, f"has {several(len(values), 'factor')} for {several(count, 'number')}; give one, or one for each"
+        )
     return np.broadcast_to(values, (count,)).copy()
 
 

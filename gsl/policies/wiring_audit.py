@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from gsl.core.layout import Layout
+from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.policies.signals import OF_JOINTS
 from gsl.policies.wired import output_ends
@@ -60,7 +61,7 @@ def audit(wiring: Wiring, ports: Ports, layout: Layout) -> Iterator[Finding]:
     """
     check_joints(wiring, layout)
     parts, moves = wiring.parts(layout), wiring.moves(layout)
-    yield Finding("names", f"{len(parts)} signals and {len(moves)} joints are in this world")
+    yield Finding("names", f"found in this world: {several(len(parts), 'signal')}, {several(len(moves), 'joint')}")
     yield _inputs(wiring, parts, ports.inputs)
     yield _outputs(wiring, layout, ports)
     yield from _order(parts, moves)
@@ -73,12 +74,12 @@ def _inputs(wiring: Wiring, parts: tuple[Part, ...], inputs: int | None) -> Find
     times = f", {wiring.history} times" if wiring.history > 1 else ""
     if inputs is None:
         return Finding(
-            "inputs", f"the wiring gives {total} numbers ({sizes}{times}); the network does not say how many"
+            "inputs", f"the wiring gives {several(total, 'number')} ({sizes}{times}); the network does not say how many"
         )
     if inputs != total:
-        problem = f"gives {total} numbers ({sizes}{times}), but the network takes {inputs}"
+        problem = f"gives {several(total, 'number')} ({sizes}{times}), but the network takes {inputs}"
         return Finding("inputs", problem, "policy.wiring.observation", refused=True)
-    return Finding("inputs", f"the network takes {inputs} numbers: {sizes}{times}")
+    return Finding("inputs", f"the network takes {several(inputs, 'number')}: {sizes}{times}")
 
 
 def _outputs(wiring: Wiring, layout: Layout, ports: Ports) -> Finding:
@@ -87,13 +88,13 @@ def _outputs(wiring: Wiring, layout: Layout, ports: Ports) -> Finding:
     if layout.choices and ports.ends is not None:
         problem = "the network acts within a range, but the actions of this world are choices"
         return Finding("outputs", problem, "policy", refused=True)
-    what = "choices" if layout.choices else "joints" if not layout.states else "actions"
+    what = several(count, "choice" if layout.choices else "joint" if not layout.states else "action")
     if outputs is None:
-        return Finding("outputs", f"{count} {what} wait for outputs; the network does not say how many it has")
+        return Finding("outputs", f"outputs are due for {what}; the network does not say how many it has")
     if outputs != count and not (layout.choices and outputs == 1):
-        problem = f"names {count} {what}, but the network has {outputs} outputs"
+        problem = f"names {what}, but the network has {several(outputs, 'output')}"
         return Finding("outputs", problem, "policy.wiring.joints", refused=True)
-    return Finding("outputs", f"the network has {outputs} outputs for {count} {what}")
+    return Finding("outputs", f"the network has {several(outputs, 'output')} for {what}")
 
 
 def _order(parts: tuple[Part, ...], moves: tuple[str, ...]) -> Iterator[Finding]:

@@ -16,6 +16,7 @@ from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.core.unit import Unit
+from gsl.core.words import several
 from gsl.errors import ConfigError
 from gsl.grounding.random_choice import exploration
 from gsl.policies.outside import warn_of_wiring
@@ -121,7 +122,9 @@ class Collect:
             with console.progress(len(jobs), f"collecting in the {self.role} world") as progress:
                 return trajectories(scenario, jobs, workers=self.workers, progress=progress)
         orders = [Order(piece.label, job) for piece, job in zip(pieces, jobs, strict=True)]
-        errand = Errand("", f"Trajectories to learn from: {len(jobs)} episodes.", until_fall=False, logs=True)
+        errand = Errand(
+            "", f"Trajectories to learn from: {several(len(jobs), 'episode')}.", until_fall=False, logs=True
+        )
         verdicts = ask(scenario, orders, errand, workers=self.workers, console=console)
         return [verdict.trajectory for verdict in verdicts if verdict is not None and verdict.trajectory is not None]
 

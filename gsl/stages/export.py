@@ -20,10 +20,10 @@ from gsl.export.servo_network import export_servo
 from gsl.export.urdf_dynamics import export_urdf
 from gsl.robots.catalogue import files
 from gsl.storage.artifact import LACKING
+from gsl.storage.manifest import NOT_HELD
 from gsl.storage.trajectories import data_file, read
 from gsl.worlds.bullet import BulletWorld
 
-NOT_HELD = "not_held.txt"
 _OWN = ("config.yaml", "log.txt")  # what any artifact has
 Format = Literal["mjcf", "isaac_lab", "bam", "urdf", "json", "servo", "lerobot", "minari", "csv", "mcap", "rerun"]
 

@@ -14,6 +14,7 @@ from gsl.core.console import Console
 from gsl.core.described import describe
 from gsl.core.plant import Plant
 from gsl.core.setting import component, setting
+from gsl.core.words import several
 from gsl.diagnosis.log.files import check_log, log_parents, on_ground, read_logs, take_motions
 from gsl.diagnosis.log.gains import unseen_gains, with_logged_gains
 from gsl.diagnosis.log.log import Log
@@ -84,7 +85,7 @@ class TrainServo:
             raise InputError(f"{self.real}: one window is held out; a servo needs two, to stop by and to check by")
         exp = exp.with_model_error(np.full(len(exp.joints), self.tolerance))
         walked = self._walks(exp)
-        console.phase(f"learning the servo from {len(exp.records)} motions; a minute for a humanoid")
+        console.phase(f"learning the servo from {several(len(exp.records), 'motion')}; a minute for a humanoid")
         learned = learn_servo(
             exp, plant, self.sim.step, labelled=bool(self.held_out), seed=self.seed,
             threads=threads(self.workers), members=self.members, walks=walked,

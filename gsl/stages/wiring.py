@@ -12,6 +12,7 @@ from gsl.core.console import Console
 from gsl.core.interfaces import Policy, World
 from gsl.core.layout import Layout
 from gsl.core.setting import component, setting
+from gsl.core.words import several
 from gsl.errors import ConfigError, GslError
 from gsl.policies.outside import Outside
 from gsl.policies.signals import UNITS
@@ -57,7 +58,11 @@ class WiringAudit:
         console.table("audit of the wiring", ("", "of", "what was seen"), rows)
         wrong = sum(finding.refused for finding in findings)
         doubts = sum(bool(finding.setting) for finding in findings) - wrong
-        said = f"the policy would be refused ({wrong})" if wrong else f"the wiring fits; {doubts} lines to look at"
+        said = (
+            f"the policy would be refused ({wrong})"
+            if wrong
+            else f"the wiring fits; {several(doubts, 'line')} to look at"
+        )
         return {"findings": [finding._asdict() for finding in findings], "said": said, "exit_code": 2 * bool(wrong)}
 
 

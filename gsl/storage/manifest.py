@@ -15,7 +15,7 @@ from gsl.core.budget import ARTIFACT_BYTES, MANIFEST_BYTES, read_json
 from gsl.core.unit import Unit
 from gsl.errors import ArtifactError, InputError
 from gsl.storage import documents
-from gsl.storage.hashing import contents_hash, file_hash
+from gsl.storage.hashing import CIRCUMSTANCES, contents_hash, file_hash
 
 SCHEMA_VERSION = 2
 WITHOUT_HASH = 1  # the version before, which is still read
@@ -24,6 +24,9 @@ HASH = "sha256"
 """Key of the hash of all other entries."""
 
 ALWAYS = frozenset({"config.yaml", "log.txt", "metrics.json"})  # files that no artifact lacks
+NOT_HELD = "not_held.txt"  # of an export: what its format lacks
+ABOUT = ALWAYS | {*CIRCUMSTANCES, NOT_HELD}
+"""Names of files that tell of an artifact and hold none of its data."""
 REMEDY = "copy the run again, or build it anew with force=true"
 """What to do about an artifact that is not as it was made."""
 STRANGE, TAKE_OUT = "is no file of the artifact", "take it out of the folder"

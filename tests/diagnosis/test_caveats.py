@@ -48,6 +48,9 @@ def test_a_value_that_hangs_on_another_effect_is_told() -> None:
     ]
     assert caveat.startswith("With backlash besides, which costs less and was passed over (not significantly better): ")
     assert "coulomb friction's torque 0.04 instead of 0.1." in caveat
+    same = replace(both, parameters=(alone.parameters[0] * 1.0001, np.array([0.02])))
+    lines = caveats(named(result, selection=cast(Any, selection(alone, same))), (), {"fraction": 1.0}, [])
+    assert not any("besides" in line for line in lines)  # "0.1 instead of 0.1" tells nothing
 
 
 def test_a_value_beyond_its_documented_range_is_told() -> None:

@@ -116,6 +116,13 @@ def test_what_does_not_fit_is_one_line(wiring: dict[str, Any], layout: Layout, p
     assert str(error.value).startswith("policy") and "\n" not in str(error.value)
 
 
+def test_a_single_thing_is_told_as_a_single_thing() -> None:
+    layout = Layout(("a",), {"position": 1}, 0.02)
+    lines = " ".join(finding.line for finding in audit(Wiring(), Ports(1, 1), layout))
+    for thing in ("1 signal", "1 joint", "1 number", "1 output"):
+        assert thing in lines and f"{thing}s" not in lines
+
+
 def test_another_order_of_joints_is_pointed_out_and_the_same_one_is_not() -> None:
     swapped = Wiring(observation=terms({"signal": "position", "joints": ("knee", "hip")}))
     verdicts = {finding.what: finding.verdict for finding in audit(swapped, Ports(2, 2), BODY)}
@@ -222,7 +229,7 @@ def test_a_function_acts_and_a_class_has_a_memory(tmp_path: Path, monkeypatch: p
     assert [counting.act(np.zeros(4))[0] for _ in range(2)] == pytest.approx([0.1, 0.2])
     with pytest.raises(GslError, match="policies_there:broken: output 0 is not finite"):
         run("broken").act(np.zeros(4))
-    with pytest.raises(GslError, match="returns 3 numbers; the wiring has 1 outputs"):
+    with pytest.raises(GslError, match="returns 3 numbers; the wiring has 1 output"):
         run("wide").act(np.zeros(4))
     with pytest.raises(ConfigError, match="cannot be loaded"):
         run("nobody")
@@ -309,7 +316,7 @@ def test_files_that_are_no_networks_are_one_line(tmp_path: Path) -> None:
     ("function", "said"),
     [
         ("blank", "output 0 is not finite"),
-        ("two", "returns 2 numbers; the wiring has 1 outputs"),
+        ("two", "returns 2 numbers; the wiring has 1 output"),
         ("nothing", "returns 0 numbers"),
         ("word", "returns no array of numbers but str"),
     ],

@@ -181,11 +181,11 @@ def _causes(findings: Findings) -> Iterator[str]:
     larger = next((fit for fit in selection.tried if _extends(fit.places, chosen.places)), None)
     why = None if larger is None else selection.objection(larger)
     if larger is not None and why is not None:
-        yield _otherwise(findings.log.robot, chosen, larger, why)
+        yield from _otherwise(findings.log.robot, chosen, larger, why)
 
 
-def _otherwise(robot: Robot, chosen: Hypothesis, larger: Hypothesis, why: str) -> str:
-    """Return what values would be with further effects, which cost less and were passed over."""
+def _otherwise(robot: Robot, chosen: Hypothesis, larger: Hypothesis, why: str) -> Iterator[str]:
+    """Yield what values would be with further effects, which cost less and were passed over, if they differ as told."""
     parameters = {(candidate.effect, candidate.scope): values for candidate, values in larger.pairs}
     further = ", ".join(effect.replace("_", " ") for effect in larger.names if effect not in chosen.names)
     instead = [
@@ -196,11 +196,13 @@ def _otherwise(robot: Robot, chosen: Hypothesis, larger: Hypothesis, why: str) -
             *candidate.tell(robot, np.vstack([here, parameters[candidate.effect, candidate.scope]])),
             strict=True,
         )
+        if f"{other:.3g}" != f"{value:.3g}"
     ]
-    return (
-        f"With {further} besides, which costs less and was passed over ({why}): {', '.join(instead)}. Intervals are "
-        "those of this answer alone."
-    )
+    if instead:
+        yield (
+            f"With {further} besides, which costs less and was passed over ({why}): {', '.join(instead)}. "
+            "Intervals are those of this answer alone."
+        )
 
 
 def _extends(places: frozenset[tuple[str, str]], chosen: frozenset[tuple[str, str]]) -> bool:

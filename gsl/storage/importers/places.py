@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from gsl.core.budget import within
 from gsl.errors import ConfigError, InputError
+from gsl.storage import manifest
 from gsl.storage.importers.formats import ENDS, HDF5, is_bag, is_npy_folder, readable, stem
 from gsl.storage.importers.hdf5_arrays import list_groups
 from gsl.storage.lerobot.dataset import Entry
@@ -119,13 +120,22 @@ def _within(path: Path, pattern: str | None) -> Iterator[Path]:
 
 
 def _fitting(folder: Path, pattern: str) -> list[Path]:
-    below = sorted(path for path in folder.glob(pattern) if readable(path) and not _is_hidden(path, folder))
+    below = sorted(
+        path
+        for path in folder.glob(pattern)
+        if readable(path) and not _is_hidden(path, folder) and not _is_about_a_run(path)
+    )
     whole = {path for path in below if path.is_dir()}
     return [path for path in below if not whole.intersection(path.parents)]
 
 
 def _is_hidden(path: Path, folder: Path) -> bool:
     return any(part.startswith(".") for part in path.relative_to(folder).parts)
+
+
+def _is_about_a_run(path: Path) -> bool:
+    """Whether a file is the log, the settings or the like of an artifact of ours, such as a folder of an export."""
+    return path.name in manifest.ABOUT and (path.parent / manifest.NAME).is_file()
 
 
 def _folders(source: str, paths: list[Path], files: Mapping[str, str]) -> list[Path]:
