@@ -19,6 +19,7 @@ from gsl.report.parts import Part, bullets, element, prose, section, table
 from gsl.report.run_page import Change, budget, curves, footfalls, joints, parameters, write_page
 from gsl.report.svg import WIDTH, svg
 
+_PLAYED = " Policies walked once more for it; figures are of other walks."
 _GROUPS = {"pi0": "of π0", "off_pi0": "off π0"}
 
 
@@ -58,7 +59,7 @@ def write_iteration_page(
         curves(rounds.searches(), rounds.unit),
         grounding(check, rounds.diagnosis),
         joints(seen.traces, seen.caption),
-        footfalls(seen.walks),
+        footfalls(seen.walks, _PLAYED),
         parameters(change),
         budget(rounds.budget),
     ]

@@ -159,10 +159,10 @@ def joints(traces: Mapping[str, Traces], note: str, title: str = "Joint by joint
     return section(title, choice("joint", pictures), note=note)
 
 
-def footfalls(walks: Sequence[Walk]) -> Markup | None:
-    """Return the section with the footfall pattern of walks."""
+def footfalls(walks: Sequence[Walk], note: str = "") -> Markup | None:
+    """Return the section with the footfall pattern of walks; `note` says where they come from."""
     drawn = svg(footfall_figure(walks, width=WIDTH), "footfall pattern") if walks else None
-    return section("Footfalls", drawn, note="A bar is the time in which a foot bears load.")
+    return section("Footfalls", drawn, note=f"A bar is the time in which a foot bears load.{note}")
 
 
 def parameters(change: Change) -> Markup | None:

@@ -16,6 +16,7 @@ from gsl.core.interfaces import REAL, Policy, Task, World
 from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.statistics import difference_interval
+from gsl.core.trajectory import Trajectory
 from gsl.core.trust import modules_in
 from gsl.core.unit import Unit
 from gsl.errors import ConfigError
@@ -34,7 +35,7 @@ from gsl.storage.documents import write_json
 from gsl.storage.policies import PolicyRecord, write_policies
 from gsl.storage.policy_choice import EVALUATION, FILE, policies, record, records, vector
 from gsl.storage.references import resolve
-from gsl.validation.evaluation_pictures import look_at
+from gsl.validation.evaluation_pictures import Walked, look_at
 from gsl.validation.uncharged import warn_uncharged
 from gsl.worlds.external import ExternalRobot
 
@@ -93,7 +94,8 @@ class Evaluate:
         if getattr(self.world, "action_noise", 0.0):
             warn_uncharged(self.world, console, REAL, "the world's noise")
         thetas = records(self.policy, self.policies) if self.policies else [self._start]
-        measure = partial(self._measure, console=console)
+        logs = dict[str, Trajectory]()
+        measure = partial(self._measure, logs=logs, console=console)
         tried = measure(thetas, _CHOICE, self.episodes)
         checked = dict(self._check(thetas, tried, measure))
         best = self._pick_passing(checked)
@@ -126,17 +128,23 @@ class Evaluate:
         first, chosen = (vector(self.policy, thetas[index]).tolist() for index in (0, best))
         change = Change(self.policy.names, first, chosen, self.policy.scale.tolist())
         console.phase("drawing the page")
-        look = self._look_at([(thetas[index], fresh[index]) for index in dict.fromkeys((best, 0))], console)
+        look = self._look_at([(thetas[index], fresh[index]) for index in dict.fromkeys((best, 0))], logs, console)
         write_evaluation_page(folder, metrics, document, change, Unit.of(self.task), look)
         return metrics
 
-    def _look_at(self, reported: Sequence[tuple[PolicyRecord, Sequence[Episode]]], console: Console) -> Look:
-        """Return what there is to see of the reported policies: an episode of each is played once more."""
+    def _look_at(
+        self,
+        reported: Sequence[tuple[PolicyRecord, Sequence[Episode]]],
+        logs: Mapping[str, Trajectory],
+        console: Console,
+    ) -> Look:
+        """Return what there is to see of the reported policies: an episode of each is played once more, or logged."""
         walks = {}
         for theta, done in reported:
             shown = next((n for n, episode in enumerate(done) if episode.fell), 0)
             seed = derive_seed(self.seed, self.kind, _REPORT, theta.name, shown)
-            walks[BEGUN.get(theta.name, theta.name)] = vector(self.policy, theta), seed
+            played = Walked(vector(self.policy, theta), seed, logs.get(theta.name))
+            walks[BEGUN.get(theta.name, theta.name)] = played
         source = resolve(self.policies) if self.policies else None
         return look_at(self._scenario, walks, source, modules_in(describe(self)), console)
 
@@ -182,9 +190,18 @@ class Evaluate:
         return falls(done) <= self.tolerated * len(done)
 
     def _measure(
-        self, thetas: Sequence[PolicyRecord], purpose: str, count: int, *, console: Console
+        self,
+        thetas: Sequence[PolicyRecord],
+        purpose: str,
+        count: int,
+        *,
+        logs: dict[str, Trajectory],
+        console: Console,
     ) -> list[list[Episode]]:
-        """Return the episodes of some policies; but for a report, none after a fall that is not tolerated."""
+        """Return the episodes of some policies; but for a report, none after a fall that is not tolerated.
+
+        Into `logs` goes what a robot that is elsewhere has logged of each policy.
+        """
         scenario = self._scenario
         jobs = [
             Job(vector(self.policy, theta), derive_seed(self.seed, self.kind, purpose, theta.name, n))
@@ -200,6 +217,10 @@ class Evaluate:
             errand = Errand(name, words, not to_the_end, logs=False)
             verdicts = ask(scenario, orders, errand, workers=self.workers, console=console)
             done = [None if verdict is None else verdict.episode for verdict in verdicts]
+            pairs = [(order.policy, verdict) for order, verdict in zip(orders, verdicts, strict=True) if verdict]
+            for name, verdict in sorted(pairs, key=lambda pair: not pair[1].episode.fell)[::-1]:  # the first fall last
+                if verdict.trajectory:
+                    logs[name] = verdict.trajectory
         else:
             with console.progress(len(jobs), f"{purpose} in the real world") as progress:
                 done = episodes(scenario, jobs, workers=self.workers, progress=progress)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,50 +24,68 @@ from gsl.storage.policy_choice import find_search
 from gsl.validation.gate import REPORT
 from gsl.validation.iteration_pictures import Way, centre, read_footfalls, show_window, trace_joints, walk_once
 from gsl.validation.replay import PAST
+from gsl.worlds.external import ExternalRobot
 
 SHORTEST = 2 * PAST  # ticks of a walk whose joints are shown: where it fell at once there is no state to begin in
 _ALONE = "the page shows no simulator"
 
 
+class Walked(NamedTuple):
+    """An episode of a policy on the real side.
+
+    Attributes:
+        parameters: Of the policy, shape (n_parameters,).
+        seed: Of the episode.
+        log: What a robot that is elsewhere has logged of it, if it is one and has.
+    """
+
+    parameters: np.ndarray
+    seed: int
+    log: Trajectory | None
+
+
 def look_at(
     real: Scenario,
-    walks: Mapping[str, tuple[np.ndarray, int]],
+    walks: Mapping[str, Walked],
     source: Path | None,
     trust: Sequence[str],
     console: Console,
 ) -> Look:
-    """Return what there is to see of policies; nothing of a robot that is elsewhere, or of what is no robot.
+    """Return what there is to see of policies; nothing of what is no robot, or of a robot that has logged nothing.
 
     Args:
         real: The real side.
-        walks: Parameters and seed of the episode that is shown, by the name of the policy; the best one first.
+        walks: The episode that is shown, by the name of the policy; the best one first.
         source: Where the policies come from.
         trust: Modules that are not gsl's and whose classes settings may name.
         console: Hears why no simulator is shown where there was a search.
     """
-    body, searched = centre(real.world), _find(source, console)
-    check = searched.folder / REPORT if searched else None
-    if body is None:
+    searched = _find(source, console)
+    check, layout = searched.folder / REPORT if searched else None, real.world.layout
+    if simulated := centre(real.world):
+        robot = simulated.plant.robot
+        episodes = {name: walk_once(real, walk.parameters, walk.seed) for name, walk in walks.items()}
+    elif isinstance(real.world, ExternalRobot):
+        robot, episodes = real.world.body, {name: walk.log for name, walk in walks.items() if walk.log}
+    else:
         return Look(check=check)
-    episodes = {name: walk_once(real, *walk) for name, walk in walks.items()}
     steps = [read_footfalls(f"{name} on the real side", walk) for name, walk in episodes.items()]
     ways: list[Way] = []
     try:
         if searched:
             plain, grounded = rebuild_search(searched, trust)
-            check_alike(plain.world.layout, body.layout)  # a step of another length would be replayed as another motion
+            check_alike(plain.world.layout, layout)  # a step of another length would be replayed as another motion
             ways = [Way(simulator, NoGrounding())] if (simulator := centre(plain.world)) else []
             if ways and not isinstance(plain.grounding, NoGrounding) and (inner := centre(grounded.world)):
                 ways.append(Way(inner, grounded.grounding))
             name, walk = next(iter(walks.items()))
             where = "in the grounded simulator" if len(ways) > 1 else "in simulation"
-            steps.append(read_footfalls(f"{name} {where}", walk_once(grounded, *walk)))
+            steps.append(read_footfalls(f"{name} {where}", walk_once(grounded, walk.parameters, walk.seed)))
     except GslError as error:  # it is of another rate, or its settings name code that nobody has trusted here
         console.status(f"{_ALONE}: {error}")
         ways = []
-    slides = body.plant.robot.slides
     long = {name: walk for name, walk in episodes.items() if len(walk) >= SHORTEST}
-    traces = {name: _trace(ways, walk, body.layout, slides) for name, walk in long.items()}
+    traces = {name: _trace(ways, walk, layout, robot.slides) for name, walk in long.items()}
     return Look(traces, [step for step in steps if step], check)
 
 

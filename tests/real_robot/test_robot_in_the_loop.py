@@ -106,6 +106,9 @@ def test_the_loop_over_files_comes_to_what_the_surrogate_itself_would_have_come_
         assert episode.sensors.keys() == other.sensors.keys()
         for name in ("time", "action", "position", "velocity", "reward", "fell"):
             np.testing.assert_array_equal(getattr(episode, name), getattr(other, name), err_msg=name)
+    for place in (folder, direct):
+        page = (place / FIRST / "evaluate/report.html").read_text()
+        assert "Joint by joint: π0" in page and "traces of LHipPitch" in page and "on the real side" in page
 
 
 def test_the_robot_is_asked_four_times_in_a_round(loop: tuple[Path, list[str]]) -> None:
