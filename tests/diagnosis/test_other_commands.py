@@ -20,8 +20,10 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.gains import with_logged_gains
 from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.log.records import cut_pieces
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.simulator import compare_with_bullet, simulator_of
+from gsl.diagnosis.verdict.self_test import relog
 from gsl.effects.effect import apply_all, build
 from gsl.errors import GslError
 from gsl.worlds.bullet import BulletWorld
@@ -85,6 +87,17 @@ def test_a_latency_delays_all_commands_and_is_named() -> None:
     result = diagnose(log({"command_latency": {"delay": 0.03}}), nominal(arm()), STEP, FEW, lambda phase: None)
     assert result.selection.chosen.names == ("command_latency",), result.verdict
     assert result.selection.chosen.parameters[0][0] == pytest.approx(0.03, rel=0.05)
+
+
+def test_a_self_tests_log_is_no_step_ahead_of_desired_speeds() -> None:
+    """It was half a step ahead, which no lag of damping makes up for here: chance gained as much as a cause."""
+    cut = cut_log(replace(log({}), metadata={}), arm())  # of a robot, which has no step
+    simulator = simulator_of(cut, nominal(arm()), STEP)
+    accurate, step = simulator.accurate, simulator.log_step
+    made = relog(cut, nominal(arm()), step, np.random.default_rng(0), accurate=accurate)
+    pieces = cut_pieces(made, arm(), PERIOD, warm_up=cut.pieces.warm_up, scored=cut.pieces.scored)
+    z = cut.comparison.residual(simulator.simulate({}, no_shifts(2), pieces), pieces)
+    assert accurate and np.sqrt(np.mean(z**2)) < 1.05
 
 
 SIM = BulletWorld("pendulum", {}, floating=False)
