@@ -100,6 +100,26 @@ def test_a_self_tests_log_is_no_step_ahead_of_desired_speeds() -> None:
     assert accurate and np.sqrt(np.mean(z**2)) < 1.05
 
 
+@pytest.mark.parametrize(("effects", "word"), [({}, "no_gap"), ({"servo_gain": {"kp": 0.7}}, "causes")])
+def test_chance_gains_no_more_where_desired_speeds_leave_no_lag(effects: Mapping[str, Any], word: str) -> None:
+    """A calibration ended too early, as its probes were too long for such logs: any effect gained by going on."""
+    rng = np.random.default_rng(2)
+    held = Held.of(apply_all(nominal(arm()), build(effects)), 0.0005, PERIOD, accurate=True)
+    episodes, paths = [], {name: path for name, path in motions().items() if name[:5] in ("trian", "chirp")}
+    order = [*paths, next(iter(paths))]  # one is played twice
+    for targets in map(paths.__getitem__, order):
+        speed = np.gradient(targets, PERIOD, axis=0)
+        path = held.play([np.hstack([targets, speed, 0.0 * speed])], [targets[0]], settle=1)[0]
+        position, others = path + NOISE * rng.standard_normal(path.shape), np.vstack([speed, speed[-1:]])
+        sensors = {f"velocity_command.{joint}": others[:, k] for k, joint in enumerate(arm().controlled)}
+        episodes.append(Trajectory(PERIOD * np.arange(len(path)), targets, position, 0.0 * position, sensors=sensors))
+    about = {"episodes": [{"policy": name} for name in order]}
+    batch = Batch(tuple(episodes), arm().controlled, PERIOD, about)
+    result = diagnose(batch, nominal(arm()), STEP, replace(FEW, nulls=3, seed=1), lambda phase: None)
+    assert max(result.null_gains) < 50.0
+    assert (result.verdict.word, result.selection.chosen.names) == (word, tuple(effects))
+
+
 SIM = BulletWorld("pendulum", {}, floating=False)
 KP, KD = (float(values[0]) for values in (SIM.plant.servo.kp, SIM.plant.servo.kd))
 
