@@ -41,7 +41,7 @@ def choose_levers(robot: Robot) -> np.ndarray:
 
 
 def in_angles(plant: Plant) -> Plant:
-    """Return a plant with its slides in angles."""
+    """Return a plant with its slides in angles; itself where none slides, or where they are in angles already."""
     return _in_units(plant, choose_levers(plant.robot))
 
 
@@ -51,8 +51,8 @@ def in_metres(plant: Plant) -> Plant:
 
 
 def _in_units(plant: Plant, ratio: np.ndarray) -> Plant:
-    """Return the plant with units of position that are so many times as long, shape (n_motors,)."""
-    if not plant.robot.slides:
+    """Return the plant with units of position that are so many times as long, (n_motors,); itself where none is."""
+    if np.allclose(ratio, 1.0):
         return plant
     servo = {name: getattr(plant.servo, name) * ratio ** power(each.unit) for name, each in numbers().items()}
     sensors = {name: getattr(plant.sensors, name) / ratio for name in ("encoder_noise", "bias")}

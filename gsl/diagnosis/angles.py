@@ -18,10 +18,10 @@ from gsl.storage.trajectory_contract import UNITS
 
 
 def with_log_in_angles(batch: Batch, plant: Plant) -> tuple[Batch, Plant]:
-    """Return a log and the plant of its robot with slides in angles; both as they are where none slides."""
-    if not plant.robot.slides:
-        return batch, plant
+    """Return a log in the units of its plant, and that, with slides in angles; both as they are where these are."""
     angular = in_angles(plant)
+    if angular is plant:
+        return batch, plant
     way = dict(zip(angular.robot.motors, levers(angular.robot).tolist(), strict=True))
     columns = np.array([way.get(joint, 1.0) for joint in batch.joints])
     labels = [

@@ -9,6 +9,7 @@ import numpy as np
 
 from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.series import Lag
+from gsl.core.slides import unit_of_slide
 from gsl.core.words import several
 from gsl.storage.importers.assembly import Episode
 from gsl.storage.importers.suspicions import (
@@ -30,7 +31,13 @@ SHOWN = 40  # rows of a table
 Document = dict[str, Any]
 
 
-def report(episodes: Sequence[Episode], files: int, period: float | None, turning: Collection[str] = ()) -> Document:
+def report(
+    episodes: Sequence[Episode],
+    files: int,
+    period: float | None,
+    turning: Collection[str] = (),
+    sliding: Collection[str] = (),
+) -> Document:
     """Return what there is to say of the trajectories.
 
     Args:
@@ -38,13 +45,14 @@ def report(episodes: Sequence[Episode], files: int, period: float | None, turnin
         files: How many files they come from.
         period: What they were resampled to [s], None if their rows are as they were.
         turning: Joints of which the mapping says that they are in radians however far they turn.
+        sliding: Joints whose positions it has in metres.
     """
     lags = [lags_of(episode) for episode in episodes]
-    doubts = suspicions(episodes, lags, turning)
+    doubts = suspicions(episodes, lags, turning, sliding)
     return {
         "files": files,
         "episodes": [_episode(episode, row) for episode, row in zip(episodes, lags, strict=True)],
-        "channels": list(_channels(episodes)),
+        "channels": list(_channels(episodes, sliding)),
         "control_period": nominal(episodes, period),
         "refused": [_words(doubt) for doubt in doubts if doubt.refused],
         "warnings": [
@@ -81,16 +89,17 @@ def _episode(episode: Episode, lags: Sequence[Lag]) -> Document:
     }
 
 
-def _channels(episodes: Sequence[Episode]) -> Iterator[Document]:
+def _channels(episodes: Sequence[Episode], sliding: Collection[str] = ()) -> Iterator[Document]:
     """Return for each column its range, and whether it is constant or stuck at an end."""
     for name, parts, commands in _columns(episodes):
         values = np.concatenate(parts).astype(float)
         group = name.partition(".")[0]
         at_end = measure_stops if group == "position" else measure_saturation
         moving = [at_end(*pair) for pair in zip(parts, commands, strict=True)] if commands else []
+        unit = UNITS.get(name, UNITS.get(name.rpartition(".")[0], UNITS.get(group, "")))
         yield {
             "column": name,
-            "unit": UNITS.get(name, UNITS.get(name.rpartition(".")[0], UNITS.get(group, ""))),
+            "unit": unit_of_slide(unit) if name.partition(".")[2] in sliding else unit,
             "least": float(values.min()),
             "most": float(values.max()),
             "constant": bool(np.ptp(values) == 0.0),

@@ -62,6 +62,11 @@ class Replays:
         return result
 
     @property
+    def accurate(self) -> bool:
+        """Replays are those of the world that the servo goes to."""
+        return False
+
+    @property
     def log_step(self) -> float:
         """Physics period of logs that a self-test makes [s]."""
         return self.step

@@ -20,8 +20,10 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.gains import with_logged_gains
 from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.log.records import cut_pieces
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.simulator import compare_with_bullet, simulator_of
+from gsl.diagnosis.verdict.self_test import relog
 from gsl.effects.effect import apply_all, build
 from gsl.errors import GslError
 from gsl.worlds.bullet import BulletWorld
@@ -85,6 +87,37 @@ def test_a_latency_delays_all_commands_and_is_named() -> None:
     result = diagnose(log({"command_latency": {"delay": 0.03}}), nominal(arm()), STEP, FEW, lambda phase: None)
     assert result.selection.chosen.names == ("command_latency",), result.verdict
     assert result.selection.chosen.parameters[0][0] == pytest.approx(0.03, rel=0.05)
+
+
+def test_a_self_tests_log_is_no_step_ahead_of_desired_speeds() -> None:
+    """It was half a step ahead, which no lag of damping makes up for here: chance gained as much as a cause."""
+    cut = cut_log(replace(log({}), metadata={}), arm())  # of a robot, which has no step
+    simulator = simulator_of(cut, nominal(arm()), STEP)
+    accurate, step = simulator.accurate, simulator.log_step
+    made = relog(cut, nominal(arm()), step, np.random.default_rng(0), accurate=accurate)
+    pieces = cut_pieces(made, arm(), PERIOD, warm_up=cut.pieces.warm_up, scored=cut.pieces.scored)
+    z = cut.comparison.residual(simulator.simulate({}, no_shifts(2), pieces), pieces)
+    assert accurate and np.sqrt(np.mean(z**2)) < 1.05
+
+
+@pytest.mark.parametrize(("effects", "word"), [({}, "no_gap"), ({"servo_gain": {"kp": 0.7}}, "causes")])
+def test_chance_gains_no_more_where_desired_speeds_leave_no_lag(effects: Mapping[str, Any], word: str) -> None:
+    """A calibration ended too early, as its probes were too long for such logs: any effect gained by going on."""
+    rng = np.random.default_rng(2)
+    held = Held.of(apply_all(nominal(arm()), build(effects)), 0.0005, PERIOD, accurate=True)
+    episodes, paths = [], {name: path for name, path in motions().items() if name[:5] in ("trian", "chirp")}
+    order = [*paths, next(iter(paths))]  # one is played twice
+    for targets in map(paths.__getitem__, order):
+        speed = np.gradient(targets, PERIOD, axis=0)
+        path = held.play([np.hstack([targets, speed, 0.0 * speed])], [targets[0]], settle=1)[0]
+        position, others = path + NOISE * rng.standard_normal(path.shape), np.vstack([speed, speed[-1:]])
+        sensors = {f"velocity_command.{joint}": others[:, k] for k, joint in enumerate(arm().controlled)}
+        episodes.append(Trajectory(PERIOD * np.arange(len(path)), targets, position, 0.0 * position, sensors=sensors))
+    about = {"episodes": [{"policy": name} for name in order]}
+    batch = Batch(tuple(episodes), arm().controlled, PERIOD, about)
+    result = diagnose(batch, nominal(arm()), STEP, replace(FEW, nulls=3, seed=1), lambda phase: None)
+    assert max(result.null_gains) < 50.0
+    assert (result.verdict.word, result.selection.chosen.names) == (word, tuple(effects))
 
 
 SIM = BulletWorld("pendulum", {}, floating=False)

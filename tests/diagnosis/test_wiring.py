@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -113,6 +114,16 @@ def test_a_row_late_is_as_well_a_latency_and_is_said_to_be() -> None:
         audit = audited(logged_again)
         assert audit.verdict == "unclear" and not audit.spoils
         assert "latency of 20 ms" in audit.summary
+
+
+@pytest.mark.parametrize("times", [10.0, 50.0])
+def test_a_clock_that_runs_too_fast_is_told_by_speeds_that_no_joint_has(times: float) -> None:
+    log = logged()
+    hurried = tuple(replace(episode, time=episode.time / times) for episode in log.episodes)
+    audit = audited(replace(log, episodes=hurried, control_period=PERIOD / times))
+    fast = [finding for finding in audit.document()["findings"] if finding["kind"] == "speed"]
+    assert audit.spoils and fast and {joint for finding in fast for joint in finding["joints"]} <= {*log.joints}
+    assert fast[0]["row"] is not None and "times what the joint can do" in fast[0]["sentence"]
 
 
 def test_two_faults_are_both_named() -> None:

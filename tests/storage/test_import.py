@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import yaml
-from commands import done
+from commands import done, refused
 
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.log.files import read_logs
@@ -179,6 +180,13 @@ def test_a_joint_that_slides_is_mapped_in_millimetres_and_newtons(tmp_path: Path
     np.testing.assert_allclose(episode.velocity, np.column_stack([TIME, 1e-3 * TIME]), atol=1e-12)
     np.testing.assert_allclose(episode.sensors["torque.elbow"], TIME, atol=1e-12)
     np.testing.assert_allclose(episode.sensors["torque.shoulder"], 1e-3 * TIME, atol=1e-12)
+    document = json.loads((tmp_path / "runs/log/import/import.json").read_text())
+    units = {channel["column"]: channel["unit"] for channel in document["channels"]}
+    assert (units["position.elbow"], units["velocity.elbow"], units["torque.elbow"]) == ("m", "m/s", "N")
+    columns["q_elbow"] = 1e3 * np.mod(8.0 * POSITION[:, 1], 2.0)  # the mapping alone knows that the elbow slides
+    csv(tmp_path / "log.csv", columns)
+    said = refused("import", "source=log.csv", f"mapping={tmp_path / 'm.yaml'}", folder=tmp_path)
+    assert "position.elbow" in said and re.search(r"jumps by its range \((1\.9\d*|2) m\)", said)
 
 
 @pytest.mark.parametrize("joints", [JOINTS, None])

@@ -211,6 +211,13 @@ def test_a_velocity_without_a_value_is_no_velocity(tmp_path: Path) -> None:
     np.testing.assert_allclose(batch.episodes[0].velocity, np.gradient(POSITION, TIME, axis=0), atol=1e-9)
     line = refused("import", "source=log.csv", "mapping.signals.velocity.optional=false", folder=tmp_path)
     assert line.endswith("no row has one; leave velocity out of the mapping, or say optional: true")
+    plain_csv(tmp_path, TIME, **nothing | {"velocity.shoulder": TIME})  # what is optional is of all joints or of none
+    line = refused("import", "source=log.csv", folder=tmp_path)
+    assert line.endswith("no row has one of every joint; leave it out with '~mapping.signals.velocity'")
+    done("import", "source=log.csv", "~mapping.signals.velocity", "name=other", folder=tmp_path)
+    plain_csv(tmp_path, TIME, **{"position.elbow": np.full(len(TIME), np.nan)})
+    line = refused("import", "source=log.csv", folder=tmp_path)
+    assert line.endswith("leave it out with mapping.joints=[shoulder]")
 
 
 def test_a_clock_too_coarse_is_not_mended_by_dropping_most_rows(tmp_path: Path) -> None:

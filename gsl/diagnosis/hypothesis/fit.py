@@ -19,6 +19,7 @@ from gsl.diagnosis.simulate.calibration import PROBES, SPREADS, ZERO, clip_shift
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.diagnosis.simulate.simulator import Bench
 
+FINE = 0.2  # of a probe where desired speeds leave little of an error: it would go past the valley that a fit follows
 REWEIGHTINGS = 2  # of a linear fit whose residuals count less the larger they are
 
 Build = Callable[[np.ndarray], Effects]
@@ -40,7 +41,7 @@ def sensitivities(bench: Bench, effects: Effects, at: np.ndarray, base: np.ndarr
         slopes[ZERO, ..., :joints] = 1.0 / bench.comparison.floor[:joints]
         return slopes
     columns = []
-    for row, probe in enumerate(PROBES):
+    for row, probe in enumerate(PROBES * (FINE if bench.pieces.wide else 1.0)):
         moved = at.copy()
         moved[row] += probe
         columns.append((bench.residual(effects, moved) - base) / probe)

@@ -221,6 +221,11 @@ class Pieces:
         return self.real.shape[1] - self.warm_up
 
     @property
+    def wide(self) -> bool:
+        """Whether other commands came beside the positions."""
+        return bool(self.windows.commands.shape[2] > self.windows.motion.shape[2])
+
+    @property
     def samples(self) -> np.ndarray:
         """Index of what a bootstrap draws, shape (W,): records if there are enough of them, else single windows."""
         few = len(np.unique(self.record)) < FEW

@@ -81,7 +81,14 @@ class InTheAir:
 
 
 def play(
-    records: Sequence[Record], plant: Plant, starts: Sequence[np.ndarray], *, step: float, period: float, settle: int
+    records: Sequence[Record],
+    plant: Plant,
+    starts: Sequence[np.ndarray],
+    *,
+    step: float,
+    period: float,
+    settle: int,
+    accurate: bool = False,
 ) -> list[np.ndarray]:
     """Return what a plant logs to the commands of records [rad], shapes (T + 1, n_motors).
 
@@ -92,10 +99,11 @@ def play(
         step: Physics period [s].
         period: Control period [s].
         settle: Control periods for which the first command is held before a record begins.
+        accurate: Whether errors fall with the square of the step.
     """
     positions = [np.zeros(0)] * len(records)
     for group in group_alike([record.conditions for record in records]):
-        held = Held.of(change(plant, records[group[0]].conditions), step, period)
+        held = Held.of(change(plant, records[group[0]].conditions), step, period, accurate)
         paths = held.play([records[k].commands for k in group], [starts[k] for k in group], settle)
         for k, path in zip(group, paths, strict=True):
             positions[k] = path

@@ -45,6 +45,7 @@ class Walking:
     workers: int = 1
     calibrates = False
     spread = 1.0
+    accurate = False
 
     @property
     def log_step(self) -> float:

@@ -50,6 +50,10 @@ class Simulator(Protocol):
         """Physics period of logs that a self-test makes [s]."""
 
     @property
+    def accurate(self) -> bool:
+        """Whether errors of replays fall with the square of the step."""
+
+    @property
     def period(self) -> float:
         """Control period [s]."""
 

@@ -47,9 +47,18 @@ class Trial:
 
 
 def relog(
-    log: Log, plant: Plant, step: float, rng: np.random.Generator, settings: VerdictSettings | None = None
+    log: Log,
+    plant: Plant,
+    step: float,
+    rng: np.random.Generator,
+    settings: VerdictSettings | None = None,
+    *,
+    accurate: bool = False,
 ) -> tuple[Record, ...]:
     """Return what a plant would have logged to the records' commands, with the floor's noise.
+
+    A scheme of first order is half a step ahead of its commands. Beside positions alone the lag of damping makes up for
+    that. A desired speed leaves no such lag: there chance would gain as much as a cause.
 
     Args:
         log: Whose commands, noise floor and conditions.
@@ -57,13 +66,16 @@ def relog(
         step: Physics period [s].
         rng: Of starts and noise.
         settings: How a record begins.
+        accurate: Whether logs with other commands beside positions are made by a scheme of second order.
     """
     how, n = settings or VerdictSettings(), len(log.joints)
     alone, drive = log.records[0].beside is None, log.robot.drive
     paths = [record.targets[0] if alone else record.position[0, drive] for record in log.records]
     starts = [path + how.start * rng.standard_normal(len(path)) for path in paths]
     settle = how.settle if alone else 1  # a speed or a torque that is held for long takes the joints elsewhere
-    played = play(log.records, plant, starts, step=step, period=log.period, settle=settle)
+    played = play(
+        log.records, plant, starts, step=step, period=log.period, settle=settle, accurate=accurate and not alone
+    )
     noisy = [path[:, :n] + log.comparison.floor * rng.standard_normal((len(path), n)) for path in played]
     return tuple(
         replace(record, position=position, velocity=slope(position, log.period))
@@ -75,7 +87,8 @@ def repose(log: Log, problem: Problem, truth: Hypothesis, rng: np.random.Generat
     """Return the problem with a simulated log in the real one's place, made with a calibration drawn anew."""
     simulator = problem.simulator
     shifts = draw_shifts(rng, len(log.joints), simulator.spread)
-    made = relog(log, change(simulator.plant, truth.effects, shifts), simulator.log_step, rng)
+    plant, step = change(simulator.plant, truth.effects, shifts), simulator.log_step
+    made = relog(log, plant, step, rng, accurate=simulator.accurate)
     cut = cut_pieces(made, log.robot, log.period, warm_up=log.pieces.warm_up, scored=log.pieces.scored)
     index = {(int(r), int(t)): k for k, (r, t) in enumerate(zip(cut.record, cut.tick, strict=True))}
 

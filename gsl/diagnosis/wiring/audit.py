@@ -20,6 +20,7 @@ from gsl.diagnosis.wiring.options import by_relation, permutations
 from gsl.diagnosis.wiring.outcome import Wiring
 from gsl.diagnosis.wiring.physics import Fit
 from gsl.diagnosis.wiring.search import Search, cut_motions
+from gsl.diagnosis.wiring.speeds import find_speeds
 from gsl.diagnosis.wiring.words import Channels, describe, remedy
 from gsl.errors import GslError
 from gsl.storage.signals.check import check_signals, mend_signals
@@ -27,6 +28,7 @@ from gsl.storage.signals.finding import Finding
 
 CLEAN, WIRING, UNCLEAR = "clean", "wiring", "unclear"
 SPOILED = ("copy", "frozen", "stale")  # signals of a joint that no replay can be compared with
+SCALES = ("scale", "rate", "permuted")  # faults after which a speed is another
 ENOUGH, FEWEST = 90.0, 4  # of a log that is replayed [s], and its episodes
 BESIDE = ("velocity",)  # signals that no replay reads
 
@@ -133,6 +135,10 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
             wiring = Search(take_part(mended), plant, step, floor, excluded, tick).run()
         except GslError as error:
             remarks.append(f"Nothing was replayed: {error}.")
+    faults = [*seen, *(stand.fault for stand in (wiring.stands if wiring else ()))]
+    scaled = {batch.joints[k] for fault in faults if fault.kind in SCALES for k in fault.joints}
+    speeds = find_speeds(mended.episodes, batch.joints, plant)
+    signals += [finding for finding in speeds if finding.joints[0] not in scaled]
     if wiring and wiring.doubted:
         like = describe(wiring.doubted, channels)
         remarks.insert(0, f"Too little to tell wiring from physics: {like} Larger and other motions would tell.")

@@ -13,8 +13,8 @@ from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
 from gsl.effects.effect import build
 from gsl.errors import ConfigError
-from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, Signal, Time
-from gsl.storage.importers.units import factor
+from gsl.storage.importers.signal import AXES, BY_NAME, COMMANDS, KNOWN, NEEDED, Signal, Time
+from gsl.storage.importers.units import factor, is_length
 from gsl.storage.trajectory_contract import INTEGERS, SHORTEST, UNITS, suggestion
 
 T = TypeVar("T")
@@ -116,7 +116,7 @@ class Mapping:
         names = list(self.joints) if self.joints is not None else None
         if names is not None and (not names or len(set(names)) != len(names) or not all(names)):
             raise ConfigError("joints", "must be different names", given=", ".join(names) or "[]")
-        for name in ("action", "position"):
+        for name in NEEDED:
             if name not in self.signals and not (name == "action" and set(OTHER_COMMANDS) & set(self.signals)):
                 raise ConfigError(f"signals.{name}", "has no value; say in which column it is")
         for pattern in self.files.values() if isinstance(self.files, dict) else filter(None, [self.files]):
@@ -140,6 +140,11 @@ class Mapping:
         """Joints of which it says one by one that their positions are in radians, however far they turn."""
         unit = self.signals["position"].unit
         return [joint for joint, name in unit.items() if name == "rad"] if isinstance(unit, dict) else []
+
+    def list_sliding(self, joints: Sequence[str]) -> list[str]:
+        """Return the joints whose positions it has in a unit of length."""
+        unit = self.signals["position"].unit
+        return [joint for joint in joints if is_length(unit.get(joint, "") if isinstance(unit, dict) else unit)]
 
     def check_joints(self, joints: Sequence[str]) -> None:
         """Refuse what is said of joints that a log does not have.

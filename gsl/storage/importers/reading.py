@@ -12,11 +12,11 @@ import numpy as np
 from gsl.errors import ConfigError, TrajectoryError
 from gsl.storage.importers.columns import Reference, list_columns, output_names, references, side_by_side
 from gsl.storage.importers.formats import table
-from gsl.storage.importers.joints import joints_of, list_left_out
+from gsl.storage.importers.joints import joints_of, leave_out, list_left_out
 from gsl.storage.importers.labels import constant, find_label_columns
 from gsl.storage.importers.mapping import Mapping as LogMapping
 from gsl.storage.importers.places import Place, fields_of
-from gsl.storage.importers.signal import AXES, BESIDE, BY_NAME, COMMANDS, FLAGS, Signal
+from gsl.storage.importers.signal import AXES, BESIDE, BY_NAME, COMMANDS, FLAGS, NEEDED, Signal
 from gsl.storage.importers.sizes import OPEN_END, is_open_line
 from gsl.storage.importers.stamps import order_rows, seconds
 from gsl.storage.importers.table import Table, missing_column
@@ -208,7 +208,7 @@ class _Reading(NamedTuple):
         """Return the signal and the number of rows that were left out."""
         raw = side_by_side(self.name, self.references, values, joints, self.table)[self.rows]
         stamps = seconds(self.table.path, self._stamps(values), self.mapping.time, self._column())
-        keep = self._find_filled(raw)
+        keep = self._find_filled(raw, joints)
         stamps, raw, rows = stamps[keep], raw[keep], self.rows[keep]
         drop = self.mapping.duplicates == "drop"
         keep = order_rows(self.table.path, stamps, self._column(), rows, drop=drop, unit=self.mapping.time.unit)
@@ -244,7 +244,7 @@ class _Reading(NamedTuple):
             return self.mapping.time.period * np.arange(len(self.rows))
         return values[self._column()][self.rows]
 
-    def _find_filled(self, raw: np.ndarray) -> np.ndarray:
+    def _find_filled(self, raw: np.ndarray, joints: Sequence[str]) -> np.ndarray:
         """Return which rows have values; empty cells are refused unless they mean that nothing is new."""
         wrong = ~np.isfinite(raw)
         empty = wrong.any(axis=1)
@@ -256,6 +256,10 @@ class _Reading(NamedTuple):
             mend = "drop or mend the row, or say mapping.blanks=skip if it means no news"
             if empty.all():
                 mend = f"no row has one; leave {self.name} out of the mapping, or say optional: true"
+                if not wrong.all():  # what is optional is left out where no joint has it
+                    kept = [joint for joint, gone in zip(joints, wrong.all(axis=0), strict=False) if not gone]
+                    out = f"leave it out with '~mapping.signals.{self.name}'"
+                    mend = f"no row has one of every joint; {leave_out(kept) if self.name in NEEDED else out}"
             problem = f"is not a finite number; {mend}"
             raise TrajectoryError(self.table.path, problem, column=column, row=int(self.rows[row]))
         return ~empty

@@ -19,6 +19,7 @@ Values = float | dict[str, float]
 BESIDE = (*OTHER_COMMANDS, "kp_command", "kd_command")  # of a servo that takes more than a position
 PER_JOINT = ("action", "grounded_action", "position", "velocity", "torque", "temperature", *BESIDE)
 COMMANDS = ("action", "grounded_action")
+NEEDED = ("action", "position")  # of every log
 FLAGS = ("enabled",)
 AXES: Mapping[str, tuple[str, ...]] = {
     **dict.fromkeys(("gyro", "acceleration", "base.position", "base.velocity"), ("x", "y", "z")),

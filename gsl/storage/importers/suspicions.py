@@ -40,7 +40,10 @@ class Suspicion(NamedTuple):
 
 
 def suspicions(
-    episodes: Sequence[Episode], lags: Sequence[Sequence[Lag]], turning: Collection[str] = ()
+    episodes: Sequence[Episode],
+    lags: Sequence[Sequence[Lag]],
+    turning: Collection[str] = (),
+    sliding: Collection[str] = (),
 ) -> list[Suspicion]:
     """Return all of them.
 
@@ -48,13 +51,14 @@ def suspicions(
         episodes: Trajectories of the same joints.
         lags: Of each trajectory and joint, from command to position.
         turning: Joints of which the mapping says that they are in radians however far they turn.
+        sliding: Joints whose positions it has in metres.
     """
     joints = episodes[0].joints
     suspicions = [*_time(episodes), *_order(episodes, lags), *_suspect_exchange(episodes)]
     for index, joint in enumerate(joints):
-        suspicions += _joint(joint, index, episodes, endless=joint in turning)
+        suspicions += _joint(joint, index, episodes, endless=joint in turning, slides=joint in sliding)
     seen = {suspicion.column for suspicion in suspicions}
-    signals = check_signals([episode.trajectory for episode in episodes], joints)
+    signals = check_signals([episode.trajectory for episode in episodes], joints, dict.fromkeys(sliding, 1.0))
     said = [finding for finding in signals if not (len(finding.columns) == 1 and finding.columns[0] in seen)]
     return [
         *suspicions,
@@ -171,7 +175,7 @@ def is_clear(lag: Lag) -> bool:
     return lag.correlation > ALIKE and lag.contrast > CONTRAST
 
 
-def _joint(joint: str, index: int, episodes: Sequence[Episode], *, endless: bool) -> Iterator[Suspicion]:
+def _joint(joint: str, index: int, episodes: Sequence[Episode], *, endless: bool, slides: bool) -> Iterator[Suspicion]:
     action, position, velocity = (_all(episodes, name, index) for name in ("action", "position", "velocity"))
     for name, values in (("action", action), ("position", position)):
         reach = float(np.abs(values).max())
@@ -179,13 +183,15 @@ def _joint(joint: str, index: int, episodes: Sequence[Episode], *, endless: bool
             whole = reach > TICKS and np.allclose(values, np.round(values))
             asked = "are these ticks (unit: ticks/4096, zero: 2048)?" if whole else "are these degrees (unit: deg)?"
             asked += f" One that turns so far: unit: {{{joint}: rad}}"
-            yield Suspicion(f"{name}.{joint}", f"reaches {reach:.4g} rad; {asked}", True)
+            said = f"m; are these millimetres (unit: {{{joint}: mm}})?" if slides else f"rad; {asked}"
+            yield Suspicion(f"{name}.{joint}", f"reaches {reach:.4g} {said}", True)
             return
     yield from _ratio(joint, action, position)
     slopes = [np.gradient(episode.trajectory.position[:, index], episode.trajectory.time) for episode in episodes]
     size = max(float(np.sqrt(np.mean(np.concatenate(slopes) ** 2))), SLOW)
     if (own := float(np.sqrt(np.mean(velocity**2)))) > FASTER * size:
-        problem = f"is {own / size:.3g} times the slope of position.{joint}; is it in deg/s or ticks/s?"
+        unit = "mm/s" if slides else "deg/s or ticks/s"
+        problem = f"is {own / size:.3g} times the slope of position.{joint}; is it in {unit}?"
         yield Suspicion(f"velocity.{joint}", problem, True)
 
 

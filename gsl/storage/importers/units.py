@@ -45,9 +45,7 @@ def factor(unit: str, wanted: str) -> float:
     Raises:
         ValueError: There is no such unit of this quantity; the text says which there are.
     """
-    name = unit.replace("·", "").replace("*", "").replace(" ", "").replace("µ", "u").replace("μ", "u")
-    name = name.replace("^2", "²")
-    name = _SPELLINGS.get(name, name)
+    name = _spell(unit)
     factors = FACTORS[wanted]
     if name in factors:
         return factors[name]
@@ -56,3 +54,14 @@ def factor(unit: str, wanted: str) -> float:
         return TURN / int(ticks.group(1))
     more = {"rad": ["ticks/4096"], "rad/s": ["ticks/4096/s"]}.get(wanted, [])
     raise ValueError(f"is no unit for what is in {wanted}{did_you_mean(unit, [*factors, *more], listed=True)}")
+
+
+def is_length(unit: str) -> bool:
+    """Tell whether positions in this unit are those of a joint that slides."""
+    return _spell(unit) in _WAYS
+
+
+def _spell(unit: str) -> str:
+    name = unit.replace("·", "").replace("*", "").replace(" ", "").replace("µ", "u").replace("μ", "u")
+    name = name.replace("^2", "²")
+    return _SPELLINGS.get(name, name)

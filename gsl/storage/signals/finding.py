@@ -15,7 +15,7 @@ class Finding(NamedTuple):
     """One thing that is wrong with the signals of a log.
 
     Attributes:
-        kind: `wrap`, `glitch`, `copy`, `frozen`, `stale`, `velocity` or `base_frame`.
+        kind: `wrap`, `glitch`, `copy`, `frozen`, `stale`, `velocity`, `base_frame` or `speed`.
         columns: Of the trajectory file.
         joints: Whose they are; none of the base.
         problem: What is wrong.
