@@ -127,6 +127,27 @@ def test_a_curve_says_what_came_out_without_grounding() -> None:
     assert without.endswith("), no falls in 10 fresh episodes.")
 
 
+@pytest.mark.parametrize(
+    ("without", "end"),
+    [
+        (-14.0, "is significant. The policy is not better than that of the search without grounding, -14.0."),
+        (
+            -15.5,
+            "is significant. The policy is not significantly better than that of the search without grounding, -15.5.",
+        ),
+        (-19.0, "is significant."),
+    ],
+)
+def test_grounding_gets_no_credit_for_what_the_search_finds_without_it(without: float, end: str) -> None:
+    rounds = Rounds(OwnReward())
+    rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
+    assert rounds.answer.sure
+    rounds.add_beside(evaluation(-20.0, without, 0.5, 8.0))
+    assert rounds.answer.sentence.endswith(end) and rounds.answer.sure == (without == -19.0)
+    assert ("not" in rounds.verdict) == (without > -19.0)
+    assert [row[-2] for row in rounds.rows[1:]] == ["+5.4 over π0", f"{without + 20.0:+.1f} over π0"]
+
+
 def test_an_environment_that_ends_has_not_fallen() -> None:
     robot, environment = Rounds(Walk()), Rounds(OwnReward())
     for rounds in (robot, environment):
