@@ -204,7 +204,8 @@ class Rounds:
         if with_it["value"] - without["value"] > math.hypot(*margins):  # both were measured independently
             return ""
         unit, doubt = self._unit, "significantly " * (with_it["value"] > without["value"])
-        return f" The policy is not {doubt}better than that of the search without grounding, {unit.format(without['value'])}."
+        reached = unit.format(without["value"])
+        return f" The policy is not {doubt}better than that of the search without grounding, {reached}."
 
     @property
     def _without(self) -> list[str]:

@@ -77,7 +77,7 @@ def test_an_evaluation_says_its_gain_with_its_interval_and_shows_what_the_table_
 def test_a_policy_alone_has_neither_curve_nor_change(tmp_path: Path) -> None:
     alone = {**METRICS, "best": "pi0", "best_generation": 0, "policies": 0, "returned": PI0}
     said = words(written(tmp_path, alone))
-    assert "How good is this policy on the real side?" in said and "Pi0 alone was measured: 19.0 cm/s (95 % " in said
+    assert "How good is this policy on the real side?" in said and "π0 alone was measured: 19.0 cm/s (95 % " in said
     assert "Learning curves" not in said and "The policy before and after" not in said
 
 

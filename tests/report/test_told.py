@@ -60,7 +60,7 @@ def test_a_value_is_never_its_gain(figures: tuple[float, ...], end: str) -> None
 def test_a_policy_alone_is_better_than_none() -> None:
     alone = {**metrics(-6.0, -6.0, 0.0, 0.0), "best": "pi0", "best_generation": 0, "policies": 0}
     sentence = describe_choice(alone, Unit())
-    assert sentence == "pi0 alone was measured: -6.0 (95 % -7.0 to -5.0), no falls in 10; 30 real episodes"
+    assert sentence == "π0 alone was measured: -6.0 (95 % -7.0 to -5.0), no falls in 10; 30 real episodes"
 
 
 def test_the_verdict_says_which_iteration_is_returned_and_why_there_are_no_more() -> None:
