@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -14,9 +15,11 @@ from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
 from gsl.grounding.none import NoGrounding
 from gsl.report.evaluation_page import Look
+from gsl.report.flight import describe_servo
 from gsl.report.joint_trace import Traces
 from gsl.report.shown import scale_of
 from gsl.rollout.rollout import Scenario
+from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policy_choice import find_search
 from gsl.validation.gate import REPORT
@@ -39,8 +42,9 @@ def look_at(
     """
     body, searched = centre(real.world), _find(source)
     check = searched.folder / REPORT if searched else None
+    findings = list(_describe_servos(searched)) if searched else []
     if body is None:
-        return Look(check=check)
+        return Look(check=check, findings=findings)
     episodes = {name: walk_once(real, *walk) for name, walk in walks.items()}
     steps = [read_footfalls(f"{name} on the real side", walk) for name, walk in episodes.items()]
     ways: list[Way] = []
@@ -58,7 +62,7 @@ def look_at(
     slides = body.plant.robot.slides
     long = {name: walk for name, walk in episodes.items() if len(walk) >= SHORTEST}
     traces = {name: _trace(ways, walk, body.layout, slides) for name, walk in long.items()}
-    return Look(traces, [step for step in steps if step], check)
+    return Look(traces, [step for step in steps if step], check, findings)
 
 
 def _find(source: Path | None) -> Artifact | None:
@@ -66,6 +70,15 @@ def _find(source: Path | None) -> Artifact | None:
         return find_search(source) if source else None
     except GslError:  # what the policies were measured in is gone
         return None
+
+
+def _describe_servos(searched: Artifact) -> Iterator[str]:
+    """Yield how near the servo is that a search had learned before; nothing where its artifact is gone."""
+    for parent in searched.manifest.parents:
+        if parent.role.endswith(".servo"):
+            with suppress(GslError):
+                folder = searched.folder / parent.path
+                yield describe_servo(Artifact(folder, manifest.read(folder)).metrics)
 
 
 def _trace(ways: Sequence[Way], walk: Trajectory, layout: Layout, slides: Sequence[str]) -> Mapping[str, Traces]:
