@@ -30,10 +30,10 @@ def name_difference(what: str, difference: Interval, unit: Unit) -> str:
         difference: Its mean with its interval, in the unit of the task.
         unit: How it is shown.
     """
-    told = tell_difference(what, difference, unit)
+    line = tell_difference(what, difference, unit)
     if math.isinf(difference.upper):
-        return f"{told}."
-    return f"{told}, which is {'' if is_significant(difference) else 'not '}significant."
+        return f"{line}."
+    return f"{line}, which is {'' if is_significant(difference) else 'not '}significant."
 
 
 def tell_difference(what: str, difference: Interval, unit: Unit) -> str:
@@ -84,15 +84,15 @@ def answer_comparison(results: Sequence[Summary], trials: Sequence[Trial], unit:
             continue
         other = max(others, key=lambda summary: (summary.method == first, summary.value.mean))
         apart = differences(trials, Cell(*best[:4]), other.method, attrgetter("value"))
-        told = tell_difference(f"{winner} minus {_say(other.method)}", apart, unit)
+        line = tell_difference(f"{winner} minus {_say(other.method)}", apart, unit)
         if is_significant(apart):
             lead = f"{winner} is best of {several(len(own), 'method')} with {worth}"
-            told += ", which is significant"
+            line += ", which is significant"
         else:
-            known = "significant" if not math.isinf(apart.upper) else "sure"
-            lead = f"no difference between {winner} and {_say(other.method)} is {known}: {worth} and "
+            sureness = "significant" if not math.isinf(apart.upper) else "sure"
+            lead = f"no difference between {winner} and {_say(other.method)} is {sureness}: {worth} and "
             lead += _finely(other.value.mean, unit)
-        sentences.append(f"In {place}, {lead}; {told}.")
+        sentences.append(f"In {place}, {lead}; {line}.")
         sure = sure and is_significant(apart)
     more = CHOSEN if len({summary.method for summary in results}) > 2 else ()
     return Answer(QUESTION, sentences[0], sure, [*sentences[1:], *more])
