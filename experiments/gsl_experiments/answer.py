@@ -30,11 +30,23 @@ def name_difference(what: str, difference: Interval, unit: Unit) -> str:
         difference: Its mean with its interval, in the unit of the task.
         unit: How it is shown.
     """
-    mean = f"{what}: {unit.format(difference.mean, sign=True)}"
+    line = tell_difference(what, difference, unit)
     if math.isinf(difference.upper):
-        return f"{mean}, in a single trial, which gives no interval."
-    bounds = unit.interval([difference.lower, difference.upper], sign=True)
-    return f"{mean} (95 % {bounds}), which is {'' if is_significant(difference) else 'not '}significant."
+        return f"{line}."
+    return f"{line}, which is {'' if is_significant(difference) else 'not '}significant."
+
+
+def tell_difference(what: str, difference: Interval, unit: Unit) -> str:
+    """Return a difference with its interval, as `name_difference` without its verdict."""
+    mean = f"{what}: {_finely(difference.mean, unit, sign=True)}"
+    if math.isinf(difference.upper):
+        return f"{mean}, in a single trial, which gives no interval"
+    return f"{mean} (95 % {unit.interval([difference.lower, difference.upper], sign=True)})"
+
+
+def _finely(value: float, unit: Unit, *, sign: bool = False) -> str:
+    """Return a value with a digit more than tables have, so that a difference is that of the values beside it."""
+    return f"{unit.factor * value:{'+' if sign else ''}.2f} {unit.name}" if unit.name else unit.format(value, sign=sign)
 
 
 def answer_difference(question: str, what: str, difference: Interval, unit: Unit, more: Sequence[str] = ()) -> Answer:
@@ -61,18 +73,26 @@ def answer_comparison(results: Sequence[Summary], trials: Sequence[Trial], unit:
         best = max(own, key=lambda summary: summary.value.mean)
         place = ", ".join(filter(None, (best.simulator, best.world)))
         place += f", iteration {best.iteration}" if any(summary.iteration > 1 for summary in results) else ""
-        worth = unit.format(best.value.mean)
+        worth = _finely(best.value.mean, unit)
         if not math.isinf(best.value.upper):
             worth += f" (95 % {unit.interval([best.value.lower, best.value.upper])})"
-        best_of = f"In {place}, {_say(best.method)} is best of {several(len(own), 'method')} with {worth}"
+        winner = _say(best.method)
         others = [summary for summary in own if summary.method != best.method]
         if not others:
-            sentences.append(f"{best_of}.")
+            sentences.append(f"In {place}, {winner} alone was tried, with {worth}.")
             sure = False
             continue
-        beside = max(others, key=lambda summary: (summary.method == first, summary.value.mean)).method
-        apart = differences(trials, Cell(*best[:4]), beside, attrgetter("value"))
-        sentences.append(name_difference(f"{best_of}; {_say(best.method)} minus {_say(beside)}", apart, unit))
+        other = max(others, key=lambda summary: (summary.method == first, summary.value.mean))
+        apart = differences(trials, Cell(*best[:4]), other.method, attrgetter("value"))
+        line = tell_difference(f"{winner} minus {_say(other.method)}", apart, unit)
+        if is_significant(apart):
+            lead = f"{winner} is best of {several(len(own), 'method')} with {worth}"
+            line += ", which is significant"
+        else:
+            sureness = "significant" if not math.isinf(apart.upper) else "sure"
+            lead = f"no difference between {winner} and {_say(other.method)} is {sureness}: {worth} and "
+            lead += _finely(other.value.mean, unit)
+        sentences.append(f"In {place}, {lead}; {line}.")
         sure = sure and is_significant(apart)
     more = CHOSEN if len({summary.method for summary in results}) > 2 else ()
     return Answer(QUESTION, sentences[0], sure, [*sentences[1:], *more])

@@ -18,6 +18,7 @@ from gsl.core.words import several
 from gsl.core.workload import Part
 from gsl.errors import ConfigError
 from gsl.grounding.effects import DiagnosedEffects, evidence_of, is_learned
+from gsl.report.run_page import Answer
 from gsl.report.study_page import write_study_page
 from gsl.stages.chain_rounds import Chain
 from gsl.stages.diagnosis_plan import flown
@@ -87,19 +88,21 @@ class Compare:
         (folder / TABLE).write_text(f"{text}\n{sizes} {made}\n", encoding="utf-8")
         task = self.iterate.task
         picture = trials_figure(trials, self.methods, worth(trials, task), tolerant=self.tolerant)
-        write_study_page(folder, answer_comparison(summary, trials, Unit.of(task)), [TABLE], [picture])
-        return self.metrics(summary)
+        answer = answer_comparison(summary, trials, Unit.of(task))
+        write_study_page(folder, answer, [TABLE], [picture])
+        return self.metrics(summary, answer)
 
     @property
     def tolerant(self) -> bool:
         """Whether a policy may fall and be stable."""
         return self.iterate.budget.tolerated > 0.0
 
-    def metrics(self, summary: Sequence[Summary]) -> dict[str, Any]:
-        """Return the summaries, and the line that `gsl runs` shows."""
+    def metrics(self, summary: Sequence[Summary], answer: Answer) -> dict[str, Any]:
+        """Return the summaries, what the page says first, and the line that `gsl runs` shows."""
         methods = ", ".join(dict.fromkeys(row.method for row in summary))
         headline = f"{several(self.trials, 'trial')} of {methods}"
-        return {"headline": headline, "trials": self.trials, "summaries": [row._asdict() for row in summary]}
+        rows = [row._asdict() for row in summary]
+        return {"headline": headline, "answer": answer.sentence, "trials": self.trials, "summaries": rows}
 
     def carry_out(
         self, folder: Path, console: Console, seconds: Callable[[], float] | None = None

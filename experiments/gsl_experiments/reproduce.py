@@ -71,7 +71,7 @@ class Reproduce(Compare):
         summary = summaries(trials)
         answer = answer_comparison(summary, trials, Unit.of(task))
         write_study_page(folder, answer, [TABLE, TRIALS], [save(picture, folder / FIGURE)])
-        return self.metrics(summary)
+        return self.metrics(summary, answer)
 
 
 def _list_named(table: PaperTable) -> set[str]:

@@ -17,7 +17,7 @@ from gsl.errors import InputError
 from gsl.models.free_run import TICKS
 from gsl.report.audit import audit_table
 from gsl.report.diagnosis_text import summary_lines
-from gsl.report.evaluation_cells import cells, columns, outcomes_beside
+from gsl.report.evaluation_cells import cells, columns, name_policy, outcomes_beside
 from gsl.report.headline import unit_of
 from gsl.report.markdown import read_table
 from gsl.report.tables import Table
@@ -152,7 +152,9 @@ def _evaluate(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
 def evaluation_table(document: Mapping[str, Any], unit: Unit) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
     """Return titles and rows of what evaluation.json holds."""
     phases = {"policies": "", "check": ", checked", "confirmation": ", fresh"}
-    named = [(row, f"{row['name']}{purpose}") for phase, purpose in phases.items() for row in document[phase]]
+    named = [
+        (row, f"{name_policy(row['name'])}{purpose}") for phase, purpose in phases.items() for row in document[phase]
+    ]
     outcomes = outcomes_beside([row for row, _ in named], unit)
     rows = [tuple(cells(row | {"interval": _bounds(row["interval"])}, name, unit, outcomes)) for row, name in named]
     return tuple(columns(outcomes, unit)), rows
@@ -168,11 +170,11 @@ def describe_choice(metrics: Mapping[str, Any], unit: Unit) -> str:
     if not metrics["policies"]:
         measured = metrics["baseline"]
         value = f"{unit.format(measured['value'])} (95 % {unit.interval(measured['interval'])})"
-        return f"{metrics['best']} alone was measured: {value}, {unit.describe_ends(measured)}; {spent}"
+        return f"{name_policy(metrics['best'])} alone was measured: {value}, {unit.describe_ends(measured)}; {spent}"
     if not metrics["best_generation"]:
         faster = "stable policy was faster" if unit.falls else "policy was better"
         better = "faster policy passed its check" if metrics["failed_check"] else faster
-        return f"no {better}: {metrics['best']} is returned; {spent}"
+        return f"no {better}: {name_policy(metrics['best'])} is returned; {spent}"
     gain, after, before = metrics["gain"], metrics["returned"], metrics["baseline"]
     bounds = unit.interval(gain["interval"], sign=True)
     values = f"{unit.format(after['value'])}, {unit.describe_ends(after)}; π0 {unit.format(before['value'])}"
@@ -206,7 +208,8 @@ def _of_others(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:
     """Return the first table that a stage of another package has written, and where the rest is."""
     page = min(folder.glob("*.md"))
     others = ", ".join(sorted(path.name for path in folder.iterdir() if path.name not in (*CIRCUMSTANCES, METRICS)))
-    return Table(str(metrics.get("headline", "what came out")), *_markdown(page), f"{folder.as_posix()}/: {others}")
+    below = "\n".join(filter(None, (metrics.get("answer"), f"{folder.as_posix()}/: {others}")))
+    return Table(str(metrics.get("headline", "what came out")), *_markdown(page), below)
 
 
 def _survey(folder: Path, metrics: Mapping[str, Any], unit: Unit) -> Table:

@@ -28,6 +28,7 @@ SILENCE = 1.0  # of a command after which a first line says what it does [s]; ma
 PULSE = 0.25  # between looks whether a line is due [s]
 WIDTH_WITHOUT_TERMINAL = 200
 BAR = 60  # characters
+WARNING = "warning: "  # begins what is said even when quiet
 
 
 @contextmanager
@@ -77,11 +78,13 @@ class Console:
     def status(self, text: str) -> None:
         """Say what is going on, on stderr."""
         checkpoint()
+        if self._part:  # a reader of all warnings of a study has to know which trial each is of
+            text = text.replace(WARNING, f"{WARNING}{self._part}: ", 1) if text.startswith(WARNING) else text
         text = visible(text)
         _log.info("%s", text)
         if self._lines is not None:
             self._lines.interrupted = True
-        if not self.quiet or text.startswith("warning:"):
+        if not self.quiet or text.startswith(WARNING.rstrip()):
             self._stderr.print(text, markup=False, highlight=False, soft_wrap=True)
 
     def table(

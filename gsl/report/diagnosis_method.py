@@ -84,11 +84,11 @@ def self_test(document: Document) -> Markup | None:
         for case in sorted(entries(test, "confusions"), key=lambda case: read_word(case, "truth"))
     ]
     gain = finite(test.get("null_gain"))
-    null = (
-        f" Where nothing was wrong, chance saved {short(gain)} in cost at most; an effect has to save 1.3 times that."
-        if gain is not None
-        else ""
-    )
+    null, least = "", finite(document.get("least_gain"))
+    if gain is not None:
+        saved = f"{short(gain)} in cost at most" if gain > 0.0 else "nothing"
+        null = f" Where nothing was wrong, chance saved {saved}"
+        null += f"; an effect has to save {short(least)}." if least is not None else "."
     return section(
         "Self-test",
         table(("true cause", "answer", "cases"), rows) if rows else None,

@@ -59,7 +59,9 @@ def parts(document: Document) -> Markup | None:
     kinds = [entry for entry in entries(figures, "by_regime") if entry.get("regime") != "all"]
     by_regime = [(regime(read_word(entry, "regime")), entry) for entry in kinds]
     drawn = [_pairs(title, rows) for title, rows in (("By joint", by_joint), ("By what the joint did", by_regime))]
-    note = "Gap / noise of the simulator as it was (above) and with the effects (below), the worst first."
+    note = (
+        "Gap / noise on held-out records, of the simulator as it was (above) and with the effects (below), worst first."
+    )
     return section("Before and after", *drawn, note=note)
 
 

@@ -37,7 +37,8 @@ def where(document: Document) -> Markup | None:
     columns = ("joint", "share of the excess", "95 % interval", "gap / noise", "most when")
     note = (
         "Share of the excess, the part of the gap that noise does not explain, by joint and by what the joint did; a "
-        "moment may count in several columns. Framed: significantly more than noise. Grey: within the noise."
+        "moment may count in several columns. Framed: significantly more than noise. Grey: within the noise. "
+        "Gap / noise is over the whole log, held-out records and others."
     )
     return section(
         "Where the gap lies",
@@ -96,7 +97,7 @@ def growth(document: Document) -> Markup | None:
     note = (
         "The simulator starts where the robot was and plays the same commands. A gap that is there at once hints at a "
         "sensor's zero, one that rises and levels off at gains, friction or delay, one that goes on rising at "
-        "something that drifts. The dashed line is the noise."
+        "something that drifts. Gap / noise is over the whole log; the dashed line is the noise."
     )
     return section("How the gap grows", drawn, note=note)
 
@@ -119,7 +120,8 @@ def sides(document: Document) -> Markup | None:
     ]
     columns = ("pair", "left", "right", "chance alone", "so")
     note = (
-        "Gap / noise of either side, and how often chance alone makes them differ so much. A difference is no fault "
+        "Gap / noise of either side, over the moments of the whole log in which both are commanded to move as far, and "
+        "how often chance alone makes them differ so much. A difference is no fault "
         "yet: the two sides may have moved differently. A fault of one side shows among the causes."
     )
     return section("Left against right", table(columns, rows) if rows else None, note=note)

@@ -27,6 +27,11 @@ def columns(outcomes: Sequence[str], unit: Unit) -> list[str]:
     return ["policy", *places, "95 % interval", ends(unit), *outcomes]
 
 
+def name_policy(name: str) -> str:
+    """Return what people call a policy: the start is π0, whatever its name in files."""
+    return "π0" if name == "pi0" else name
+
+
 def ends(unit: Unit) -> str:
     """Return the title over `ended`."""
     return "falls" if unit.falls else "episodes"

@@ -29,11 +29,13 @@ class Look(NamedTuple):
         traces: Of each policy by joint, the best one first; none where there are no joints.
         walks: Whose feet are known.
         check: Where the check of a grounding lies, if the policies are of a search.
+        findings: What that grounding had learned, a sentence each.
     """
 
     traces: Mapping[str, Mapping[str, Traces]] = {}
     walks: Sequence[Walk] = ()
     check: Path | None = None
+    findings: Sequence[str] = ()
 
 
 def write_evaluation_page(
@@ -50,7 +52,7 @@ def write_evaluation_page(
         look: What there is to see.
     """
     alone, choice = not metrics["policies"], describe_choice(metrics, unit)
-    sentence, sure = f"{choice[0].upper()}{choice[1:]}.", alone
+    sentence, sure = f"{choice[0] if choice.startswith('π') else choice[0].upper()}{choice[1:]}.", alone
     question = f"{'How good is this policy' if alone else 'Which of these policies is the best'} on the real side?"
     if metrics["best_generation"]:
         after, before, gain = (metrics[key] for key in ("returned", "baseline", "gain"))
@@ -63,7 +65,7 @@ def write_evaluation_page(
     sections = [
         section("Policies on the real side", table(columns, rows)),
         None if alone else curves([searched], unit.name),
-        grounding(read_check(look.check) if look.check else None, []),
+        grounding(read_check(look.check) if look.check else None, look.findings),
         *_draw_joints(look),
         footfalls(look.walks),
         None if alone else parameters(change),
@@ -74,6 +76,8 @@ def write_evaluation_page(
 
 def _draw_joints(look: Look) -> Iterator[Markup | None]:
     """Yield a section a policy; simulators are there where the policies are of a search."""
-    for name, traces in look.traces.items():
+    order = list(next(iter(look.traces.values()), {}))  # whoever compares two policies looks at the same joint
+    for name, own in look.traces.items():
+        traces = {joint: own[joint] for joint in dict.fromkeys(filter(own.__contains__, [*order, *own]))}
         replayed = any(trace.simulation is not None for trace in traces.values())
         yield joints(traces, _CAPTION + _REPLAYED * replayed, f"Joint by joint: {name}")

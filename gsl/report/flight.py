@@ -39,8 +39,11 @@ class Flight(NamedTuple):
     @property
     def gap(self) -> str:
         """How near a learned servo is, nothing where none was learned."""
-        if self.servo is None:
-            return ""
-        before, after = self.servo["floors_before"], self.servo["floors_after"]
-        fell = f"on held-out motions the gap fell from {before:.1f} to {after:.2f} noise floors"
-        return f"Learned servo: {fell}. It acts on every joint's torque in the simulator."
+        return "" if self.servo is None else describe_servo(self.servo)
+
+
+def describe_servo(metrics: Mapping[str, Any]) -> str:
+    """Return how near a learned servo is to the robot, from its metrics."""
+    before, after = metrics["floors_before"], metrics["floors_after"]
+    fell = f"on held-out motions the gap fell from {before:.1f} to {after:.2f} noise floors"
+    return f"Learned servo: {fell}. It acts on every joint's torque in the simulator."

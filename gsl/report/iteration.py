@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -40,7 +41,7 @@ class Rounds:
     def columns(self) -> tuple[str, ...]:
         """Titles of the rows."""
         places = ("in simulation", "on the real side", "95 % interval", ends(self._unit))
-        return ("iteration", "policy", *places, "gain over the last", "real episodes")
+        return ("iteration", "policy", *places, "gain", "real episodes")
 
     @property
     def rising(self) -> bool:
@@ -67,7 +68,8 @@ class Rounds:
         if self.rising or (first and evaluation.metrics["gain"]["value"] > 0.0):
             self.best = evaluation
         in_the_air = f" + {self._flight.episodes} in the air" if first and self._flight else ""
-        return self._add(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", first=first)
+        over = f"π{len(self._done) - 1}"
+        return self._add(str(len(self._done)), evaluation.metrics, f"{cost}{in_the_air}", over, first=first)
 
     def add_refusal(self, why: str, collected: int) -> tuple[str, ...]:
         """Take in an iteration that ended at its grounding, after some real episodes, and return its row."""
@@ -82,7 +84,9 @@ class Rounds:
     def add_beside(self, evaluation: Artifact) -> list[tuple[str, ...]]:
         """Take in what is shown for comparison, and return its rows."""
         self._beside = evaluation
-        return self._add("no grounding", evaluation.metrics, str(evaluation.metrics["real_episodes"]), first=False)
+        return self._add(
+            "no grounding", evaluation.metrics, str(evaluation.metrics["real_episodes"]), "π0", first=False
+        )
 
     @property
     def verdict(self) -> str:
@@ -103,7 +107,7 @@ class Rounds:
         fell = f"{after['falls']} falls in " if unit.falls else ""
         end = f"{fell}{after['episodes']} fresh episodes. {self._end}{cost}"
         values = f"π0 {unit.bare(before['value'])}, returned{of} {unit.format(after['value'])}"
-        return f"On the real side: {values}, {last}, {end}"
+        return f"On the real side: {values}, {last}, {end}{self._without_gain}"
 
     @property
     def _end(self) -> str:
@@ -187,7 +191,21 @@ class Rounds:
             return Answer(question, sentence, sure=False, more=[self.verdict, *self._without])
         over = "π0" if figures["returned_iteration"] == 1 else "the iteration before"
         sentence, sure = describe_gain("The returned policy", after, before, gain, unit, over)
-        return Answer(question, sentence, sure, more=[self.verdict, *self._without])
+        more, nothing = [self.verdict, *self._without], self._without_gain
+        return Answer(question, f"{sentence}{nothing}", sure and not nothing, more)
+
+    @property
+    def _without_gain(self) -> str:
+        """That the returned policy is not surely better than that of the search without grounding, if that is so."""
+        if self._beside is None or self.best is None:
+            return ""
+        with_it, without = self.best.metrics["returned"], self._beside.metrics["returned"]
+        margins = [summary["value"] - summary["interval"][0] for summary in (with_it, without)]
+        if with_it["value"] - without["value"] > math.hypot(*margins):  # both were measured independently
+            return ""
+        unit, doubt = self._unit, "significantly " * (with_it["value"] > without["value"])
+        reached = unit.format(without["value"])
+        return f" The policy is not {doubt}better than that of the search without grounding, {reached}."
 
     @property
     def _without(self) -> list[str]:
@@ -220,10 +238,12 @@ class Rounds:
         document = json.loads((evaluation.folder / EVALUATION).read_text(encoding="utf-8"))
         return search(label, document, shown=self._unit.factor, returned=evaluation.metrics["best"], start=start)
 
-    def _add(self, label: str, metrics: Mapping[str, Any], cost: str, *, first: bool) -> list[tuple[str, ...]]:
+    def _add(
+        self, label: str, metrics: Mapping[str, Any], cost: str, over: str, *, first: bool
+    ) -> list[tuple[str, ...]]:
         simulated, gain = metrics["returned_value_sim"], metrics["gain"]
         expected = "" if simulated is None else self._unit.bare(simulated)
-        improvement = format_gain(gain["share"]) or self._unit.format(gain["value"], sign=True)
+        improvement = f"{format_gain(gain['share']) or self._unit.format(gain['value'], sign=True)} over {over}"
         zero: tuple[str, ...] = ("0", "π0", "", *self._format_measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
         name = BEGUN.get(metrics["best"], metrics["best"])

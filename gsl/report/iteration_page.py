@@ -76,7 +76,7 @@ def grounding(check: Mapping[str, Any] | None, diagnosis: Sequence[str]) -> Mark
     if rows := _loads(check or {}):
         said += [
             element("p", "Loads on single joints in the air:"),
-            table(("joints", "", "simulator", "grounded"), rows),
+            table(("joints", "", "simulator", "grounded", "real"), rows),
         ]
     said += [element("p", prose(f"The check says: {line}.")) for line in (check or {}).get("problems") or []]
     note = "The simulator starts in held-out real states and plays real actions for ten ticks." if errors else ""
@@ -84,12 +84,12 @@ def grounding(check: Mapping[str, Any] | None, diagnosis: Sequence[str]) -> Mark
 
 
 def _loads(check: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Return how groups of joints answer loads in both simulators, as far as the check has measured it."""
+    """Return how groups of joints answer loads in both simulators and on the real side, as far as it was measured."""
     return [
         (
             group,
             title,
-            *("-" if (value := values.get(name)) is None else f"{value:.3g}" for name in ("sim", "grounded")),
+            *("" if (value := values.get(name)) is None else f"{value:.3g}" for name in ("sim", "grounded", "real")),
         )
         for group, quantities in ((check.get("compliance") or {}).get("groups") or {}).items()
         for quantity, title in QUANTITIES.items()

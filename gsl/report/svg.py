@@ -25,7 +25,7 @@ def svg(figure: Figure, title: str) -> Markup:
     """Return a figure as it is drawn on a page: equal figures give equal bytes, and only equal parts have equal names.
 
     Args:
-        figure: One that is wider than `WIDTH` takes the page's width, and scrolls sideways on a phone.
+        figure: One that is wider than `WIDTH` takes the page's width.
         title: What it shows, for those who cannot see it.
     """
     import matplotlib

@@ -31,8 +31,9 @@ from gsl.report.diagnosis import report_html
 from gsl.rollout.parallel import Workers, threads
 from gsl.stages.audit import audit_log, write_wiring
 from gsl.storage import documents
-from gsl.storage.diagnosis_report import REPORT, SIMULATOR, WORLD, report_of
+from gsl.storage.diagnosis_report import REPORT, SIMULATOR, WORLD, report_of, see_from
 from gsl.storage.hashing import PAGE
+from gsl.storage.origin import origin
 from gsl.validation.policy_gap import Effort, policy_gap
 from gsl.validation.real_returns import RealReturns, list_parents, real_returns
 from gsl.worlds.bullet import BulletWorld
@@ -168,7 +169,8 @@ class Diagnose:
             report["limits"] = [asdict(limit) for limit in limits(findings, report["shrinkage"], tick)]
         report["caveats"] += filter(None, [*remarks, *self._warnings(batch), clock_caveat(batch, self.clocks)])
         documents.write_json(folder / REPORT, report)
-        (folder / PAGE).write_text(report_html(report), encoding="utf-8")
+        how = origin()  # what a reader types is typed where this command was, as the terminal has it
+        (folder / PAGE).write_text(report_html(see_from(report, how.out) if how else report), encoding="utf-8")
         (folder / WORLD).parent.mkdir()
         (folder / WORLD).write_text(self._world(findings, report["summary"]), encoding="utf-8")
         if report["own"]:

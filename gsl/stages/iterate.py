@@ -149,7 +149,10 @@ class Iterate:
         best = vector(self.policy, records(self.policy, str(folder / FILE))[-1])
         seen = self._draw(folder, home, first, best)
         change = Change(self.policy.names, self.policy.initial.tolist(), best.tolist(), self.policy.scale.tolist())
-        write_iteration_page(folder, rounds, seen, change, read_check(home / FIRST / "optimize" / REPORT), remarks)
+        check = read_check(home / FIRST / "optimize" / REPORT)
+        if yielding:
+            check = {**(check or {}), SECTION: {"groups": yielding.metrics()}}  # the real side is in it as well
+        write_iteration_page(folder, rounds, seen, change, check, remarks)
         if yielding:
             console.status(yielding.sentence)
         return {**rounds.metrics(), SECTION: yielding.metrics() if yielding else None}

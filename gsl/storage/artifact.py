@@ -143,7 +143,7 @@ def build(
             return note(Artifact(out, same))
         progress, kept = getattr(stage, "progress", ""), getattr(stage, "kept", ())
         with workplace(out, identity.key, progress=progress, kept=kept) as folder:
-            made = _work(stage, identity, config, folder, command, console)
+            made = _work(stage, identity, config, folder, out, command, console)
             manifest.write(folder, made)
             flush_tree(folder)
             install(folder, out)
@@ -216,7 +216,13 @@ def _can_hold_more(artifact: Artifact) -> bool:
 
 
 def _work(
-    stage: Stage, identity: Identity, config: Mapping[str, Any], folder: Path, command: str, console: Console
+    stage: Stage,
+    identity: Identity,
+    config: Mapping[str, Any],
+    folder: Path,
+    out: Path,
+    command: str,
+    console: Console,
 ) -> Manifest:
     begin = time.perf_counter()
     created = datetime.now(UTC).isoformat(timespec="seconds")
@@ -227,7 +233,11 @@ def _work(
         sources = _sources(stage).items()
         parents = tuple(Parent(role, relative(path, folder), identity.parents[role]) for role, path in sources)
         listening = listen_to_steps(StepLog(folder, identity.kind).note)
-        with collect_links() as links, at_work(Origin(command, settings, parents, folder, links)) as origin, listening:
+        with (
+            collect_links() as links,
+            at_work(Origin(command, settings, parents, folder, out, links)) as origin,
+            listening,
+        ):
             try:
                 metrics = stage.run(folder, console)
             except SystemExit as error:  # of a user's own code: the work is not done, whatever the code says

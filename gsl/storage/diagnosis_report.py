@@ -22,6 +22,11 @@ def report_of(folder: Path) -> dict[str, Any]:
     """
     report: dict[str, Any] = read_json(folder / REPORT)
     check_shape(report)
+    return see_from(report, folder)
+
+
+def see_from(report: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a report that lies in `folder` with paths that are good from where the command runs."""
     files = {key: (folder / report[key]).as_posix() for key in ("world_file", "report") if report.get(key)}
     wanted = report.get("next_experiment")
     if wanted and wanted.get("file"):

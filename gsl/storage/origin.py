@@ -33,6 +33,7 @@ class Origin:
         settings: All of them, as config.yaml has them.
         parents: What it is made from.
         folder: Where it is made.
+        out: Where it lies afterwards, as the command has it.
         built: What has been built beside it so far, by absolute path; it grows.
     """
 
@@ -40,6 +41,7 @@ class Origin:
     settings: str
     parents: tuple[Parent, ...]
     folder: Path
+    out: Path
     built: Mapping[Path, Artifact]
 
     @property

@@ -98,7 +98,8 @@ class ComplianceReport:
             f"{group}: stiffness {self._describe(group, 'stiffness')}, strength {self._describe(group, 'torque')}"
             for group in self.sim.groups
         ]
-        return f"Compliance transferred, 0 as stiff as the simulator, 1 as the robot: {'; '.join(parts)}."
+        scale = "0 as the simulator, 1 as the robot, above 1 changed by more than the robot differs"
+        return f"Compliance transferred, {scale}: {'; '.join(parts)}."
 
     def means(self) -> dict[str, dict[str, dict[str, float]]]:
         """Return the mean over each group's joints, by group, quantity and robot."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,9 +17,11 @@ from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
 from gsl.grounding.none import NoGrounding
 from gsl.report.evaluation_page import Look
+from gsl.report.flight import describe_servo
 from gsl.report.joint_trace import Traces
 from gsl.report.shown import scale_of
 from gsl.rollout.rollout import Scenario
+from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policy_choice import find_search
 from gsl.validation.gate import REPORT
@@ -62,13 +65,14 @@ def look_at(
     """
     searched = _find(source, console)
     check, layout = searched.folder / REPORT if searched else None, real.world.layout
+    findings = list(_describe_servos(searched)) if searched else []
     if simulated := centre(real.world):
         robot = simulated.plant.robot
         episodes = {name: walk_once(real, walk.parameters, walk.seed) for name, walk in walks.items()}
     elif isinstance(real.world, ExternalRobot):
         robot, episodes = real.world.body, {name: walk.log for name, walk in walks.items() if walk.log}
     else:
-        return Look(check=check)
+        return Look(check=check, findings=findings)
     steps = [read_footfalls(f"{name} on the real side", walk) for name, walk in episodes.items()]
     ways: list[Way] = []
     try:
@@ -86,7 +90,7 @@ def look_at(
         ways = []
     long = {name: walk for name, walk in episodes.items() if len(walk) >= SHORTEST}
     traces = {name: _trace(ways, walk, layout, robot.slides) for name, walk in long.items()}
-    return Look(traces, [step for step in steps if step], check)
+    return Look(traces, [step for step in steps if step], check, findings)
 
 
 def _find(source: Path | None, console: Console) -> Artifact | None:
@@ -95,6 +99,15 @@ def _find(source: Path | None, console: Console) -> Artifact | None:
     except GslError as error:  # what the policies were measured in is damaged
         console.status(f"{_ALONE}: {error}")
         return None
+
+
+def _describe_servos(searched: Artifact) -> Iterator[str]:
+    """Yield how near the servo is that a search had learned before; nothing where its artifact is gone."""
+    for parent in searched.manifest.parents:
+        if parent.role.endswith(".servo"):
+            with suppress(GslError):
+                folder = searched.folder / parent.path
+                yield describe_servo(Artifact(folder, manifest.read(folder)).metrics)
 
 
 def _trace(ways: Sequence[Way], walk: Trajectory, layout: Layout, slides: Sequence[str]) -> Mapping[str, Traces]:

@@ -145,13 +145,13 @@ def _draw_walk(robot: Robot, shot: Shot, policy: Policy, folder: Path) -> None:
 
 
 def read_footfalls(label: str, walk: Trajectory) -> Walk | None:
-    """Return when each foot bears load, None where that is not known."""
+    """Return when each foot bears load, None where that is not known or no foot ever does, as in the air."""
     prefix = "foot_force."
     feet = {
         name.removeprefix(prefix): force > LOADED for name, force in walk.sensors.items() if name.startswith(prefix)
     }
     fell = float(walk.time[-1]) if walk.ended_in_a_fall else None
-    return Walk(label, walk.time, feet, fell) if feet else None
+    return Walk(label, walk.time, feet, fell) if any(map(np.any, feet.values())) else None
 
 
 def _draw_joint(folder: Path, plain: Way, grounded: Way, real: Trajectory) -> dict[str, Traces]:

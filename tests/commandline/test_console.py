@@ -136,12 +136,14 @@ def test_tables_of_a_part_are_progress(capsys: pytest.CaptureFixture[str]) -> No
             console.table("values", ["a"], [[1]])
             raise KeyError
         console.table("errors", ["a"], [[1]])
+        console.status("warning: look at this")
         with console.live_table("rounds", ["round"]) as rounds:
             rounds.row(1)
     console.table("results", ["a"], [[1]])
     out, err = capsys.readouterr()
     assert "its second round: values" in err and "gat, trial 1: errors" in err and "gat, trial 1: rounds" in err
     assert "errors" not in out and "results" in out
+    assert "warning: gat, trial 1: look at this\n" in err
 
 
 def test_progress_without_a_terminal_is_a_line_every_ten_seconds_at_most(

@@ -67,15 +67,21 @@ def test_differences_are_paired_by_trial() -> None:
     assert difference.mean == pytest.approx((20.0 - 0.0 + 10.0 + 5.0) / 2)
 
 
-def test_a_sentence_says_which_search_is_the_best_and_none_is_no_name() -> None:
+def test_a_sentence_says_which_search_is_the_best_if_that_is_significant_and_none_is_no_name() -> None:
     unit = Unit(100.0, "cm/s")
+    sure = [*(_trial("none", k, 0.01 * k, 4) for k in (1, 2)), *(_trial("gat", k, 0.2 + 0.02 * k, 4) for k in (1, 2))]
+    answer = answer_comparison(summaries(sure), sure, unit)
+    assert answer.sure and answer.sentence.startswith("In nao_worn, gat is best of 2 methods with 30.75 cm/s (95 % ")
+    assert answer.sentence.endswith("), which is significant.")
     sentence = answer_comparison(summaries(TRIALS), TRIALS, unit).sentence
-    assert sentence.startswith("In nao_worn, gat is best of 2 methods with 28.7 cm/s (95 % ")
-    assert "; gat minus the search without grounding: +4.4 cm/s (95 % " in sentence  # 0.25 · (0.2 + 0.15) / 2
+    nothing = (
+        "In nao_worn, no difference between gat and the search without grounding is significant: 28.75 cm/s (95 % "
+    )
+    assert sentence.startswith(nothing) and ") and 24.38 cm/s; " in sentence
+    assert "; gat minus the search without grounding: +4.38 cm/s (95 % " in sentence  # 0.25 · (0.2 + 0.15) / 2
     losses = [*TRIALS[:2], _trial("gat", 1, -0.2, 4), _trial("gat", 2, -0.1, 2)]
     answer = answer_comparison(summaries(losses), losses, unit)
-    assert answer.sentence.startswith("In nao_worn, the search without grounding is best of 2 methods with 24.4 cm/s")
-    assert "; the search without grounding minus gat: +3.1 cm/s (95 % " in answer.sentence  # 0.25 · (0.2 + 0.05) / 2
+    assert "; the search without grounding minus gat: +3.12 cm/s (95 % " in answer.sentence  # 0.25 · (0.2 + 0.05) / 2
 
 
 def test_winners_are_counted_over_all_trials() -> None:

@@ -337,7 +337,7 @@ def test_a_network_that_makes_choices_is_evaluated_and_cannot_be_searched(tmp_pa
     (tmp_path / "choosing.py").write_text("def act(seen):\n    return [0.0]\n")
     base = ("world=cliff_walking", "policy=python", "policy.function=choosing:act", "task=own_reward")
     few = ("policies=null", "episodes=2", "check=2", "confirmation=2")
-    assert "pi0 alone was measured" in done("evaluate", *base, *few, folder=tmp_path).out
+    assert "π0 alone was measured" in done("evaluate", *base, *few, folder=tmp_path).out
     said = refused("optimize", *base, "grounding=none", folder=tmp_path)
     assert said.startswith("policy = FunctionPolicy: has no parameters")
 

@@ -19,6 +19,7 @@ from gsl.report.diagnosis_next import steps
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.diagnosis_verdict import cause_name, headline, places, where_sentence
 from gsl.report.diagnosis_words import between, interval, level, list_words, probability, share, short, value
+from gsl.storage.diagnosis_report import see_from
 
 pytestmark = pytest.mark.slow
 
@@ -329,6 +330,19 @@ def test_an_explanation_that_costs_less_says_why_it_is_not_the_verdict() -> None
         "backlash of all joints 90 % −300 passed over: not significantly better" in text
         and "has to save 2,800 over calibration alone" in text
     )
+
+
+def test_chance_that_saved_nothing_is_called_so() -> None:
+    test = {"cases": 4, "null_gain": -27.3}
+    text = words(report_html({"self_test": test, "least_gain": 20.0}))
+    assert "Where nothing was wrong, chance saved nothing; an effect has to save 20.0." in text
+    text = words(report_html({"self_test": test | {"null_gain": 40.0}, "least_gain": 52.0}))
+    assert "chance saved 40.0 in cost at most; an effect has to save 52.0." in text
+
+
+def test_a_page_names_folders_as_the_terminal_does() -> None:
+    seen = see_from(made.document() | {"world_file": "world/diagnosed.yaml"}, Path("runs/first/diagnose"))
+    assert "gsl optimize --config-dir runs/first/diagnose world=diagnosed" in words(report_html(seen))
 
 
 def test_the_verdict_is_marked_among_the_explanations() -> None:

@@ -8,6 +8,7 @@ import json
 import math
 import re
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -33,6 +34,7 @@ from gsl.rollout.promise import promise
 from gsl.storage.artifact import build
 from gsl.storage.origin import Origin
 from gsl.storage.policies import PolicyRecord
+from gsl.validation.iteration_pictures import read_footfalls
 
 HOSTILE = "<script>alert(1)</script>\"' onload='x' $\\frac{"
 TIME = np.arange(0.0, 0.8, 0.02)
@@ -77,7 +79,7 @@ def test_an_evaluation_says_its_gain_with_its_interval_and_shows_what_the_table_
 def test_a_policy_alone_has_neither_curve_nor_change(tmp_path: Path) -> None:
     alone = {**METRICS, "best": "pi0", "best_generation": 0, "policies": 0, "returned": PI0}
     said = words(written(tmp_path, alone))
-    assert "How good is this policy on the real side?" in said and "Pi0 alone was measured: 19.0 cm/s (95 % " in said
+    assert "How good is this policy on the real side?" in said and "π0 alone was measured: 19.0 cm/s (95 % " in said
     assert "Learning curves" not in said and "The policy before and after" not in said
 
 
@@ -94,6 +96,22 @@ def test_an_evaluation_shows_joints_feet_and_falls_of_what_it_reports(tmp_path: 
     assert "knee [°]" in best and "from real" in best and "play its actions" in best
     assert "hip [°]" in start and "from real" not in start and "play its actions" not in start
     assert "generation_01 on the real side" in start and " fell" in start.partition("Footfalls")[2]
+
+
+def test_two_policies_are_shown_at_the_same_joint_first(tmp_path: Path) -> None:
+    best, start = (dict.fromkeys(names, trace(0.1)) for names in (("knee", "hip"), ("hip", "knee")))
+    seen = Look({"generation_01": best, "π0": start}, findings=["Learned servo: nearer."])
+    page = Page(written(tmp_path, look=seen))
+    assert [value for _, name, value in page.attributes if name == "data-of"] == ["knee", "hip"] * 2
+    assert "Learned servo: nearer." in words((tmp_path / "report.html").read_text("utf-8"))
+
+
+def test_feet_that_never_touch_the_ground_have_no_pattern() -> None:
+    force = np.zeros(len(TIME))
+    walk = cast(Any, SimpleNamespace(time=TIME, sensors={"foot_force.left": force}, ended_in_a_fall=False))
+    assert read_footfalls("in the air", walk) is None
+    walk.sensors["foot_force.right"] = force + 30.0
+    assert read_footfalls("on the ground", walk) is not None
 
 
 def test_a_gain_that_may_be_none_is_called_so(tmp_path: Path) -> None:
@@ -243,6 +261,9 @@ def test_what_the_check_measured_is_what_grounding_changes() -> None:
     loads = {"legs": {"stiffness": {"sim": 150.0, "grounded": 82.2}}}
     said = words(str(grounding({"compliance": {"groups": loads}}, [])))
     assert "joints simulator grounded legs stiffness [N·m/rad] 150 82.2" in said
+    loads["legs"]["stiffness"]["real"] = 81.5
+    said = words(str(grounding({"compliance": {"groups": loads}}, [])))
+    assert "joints simulator grounded real legs stiffness [N·m/rad] 150 82.2 81.5" in said
     assert grounding(None, []) is None
 
 
@@ -323,12 +344,12 @@ def test_a_log_that_cannot_be_read_costs_no_page_its_warnings(tmp_path: Path) ->
     (folders[1] / "log.txt").write_bytes(b"x gsl: warning: half a letter \xcf")
     (folders[2] / "log.txt").symlink_to("/proc/kmsg")
     built = cast(Any, dict.fromkeys(folders[1:]))
-    warnings = Origin("gsl x", "", (), folders[0], built).warnings
+    warnings = Origin("gsl x", "", (), folders[0], folders[0], built).warnings
     assert warnings[0] == "number 0\\u001b[2J" and len(warnings) == 51 and warnings[-1] == "31 more, in the logs"
 
 
 def test_a_part_of_a_chain_says_how_it_is_repeated_alone(tmp_path: Path) -> None:
     typed = ("gsl iterate (it)", "gsl iterate")
-    said = [join(*describe_origin(Origin(command, "a: 1", (), tmp_path, {}))) for command in typed]
+    said = [join(*describe_origin(Origin(command, "a: 1", (), tmp_path, tmp_path, {}))) for command in typed]
     assert "A part of gsl iterate; gsl rerun and the folder of this page repeat it alone." in said[0]
     assert "A part of" not in said[1] and "gsl iterate" in said[1]

@@ -60,7 +60,7 @@ def test_a_value_is_never_its_gain(figures: tuple[float, ...], end: str) -> None
 def test_a_policy_alone_is_better_than_none() -> None:
     alone = {**metrics(-6.0, -6.0, 0.0, 0.0), "best": "pi0", "best_generation": 0, "policies": 0}
     sentence = describe_choice(alone, Unit())
-    assert sentence == "pi0 alone was measured: -6.0 (95 % -7.0 to -5.0), no falls in 10; 30 real episodes"
+    assert sentence == "π0 alone was measured: -6.0 (95 % -7.0 to -5.0), no falls in 10; 30 real episodes"
 
 
 def test_the_verdict_says_which_iteration_is_returned_and_why_there_are_no_more() -> None:
@@ -125,6 +125,27 @@ def test_a_curve_says_what_came_out_without_grounding() -> None:
     without = rounds.answer.more[-1]
     assert without.startswith("Without grounding the same search returned a policy with 22.0 cm/s (95 % ")
     assert without.endswith("), no falls in 10 fresh episodes.")
+
+
+@pytest.mark.parametrize(
+    ("without", "end"),
+    [
+        (-14.0, "is significant. The policy is not better than that of the search without grounding, -14.0."),
+        (
+            -15.5,
+            "is significant. The policy is not significantly better than that of the search without grounding, -15.5.",
+        ),
+        (-19.0, "is significant."),
+    ],
+)
+def test_grounding_gets_no_credit_for_what_the_search_finds_without_it(without: float, end: str) -> None:
+    rounds = Rounds(OwnReward())
+    rounds.add(evaluation(-20.0, -14.6, 3.0, 8.0), 10)
+    assert rounds.answer.sure
+    rounds.add_beside(evaluation(-20.0, without, 0.5, 8.0))
+    assert rounds.answer.sentence.endswith(end) and rounds.answer.sure == (without == -19.0)
+    assert ("not" in rounds.verdict) == (without > -19.0)
+    assert [row[-2] for row in rounds.rows[1:]] == ["+5.4 over π0", f"{without + 20.0:+.1f} over π0"]
 
 
 def test_an_environment_that_ends_has_not_fallen() -> None:
