@@ -60,10 +60,12 @@ def listed(*words: str, folder: Path) -> list[str]:
     return [artifact["folder"].removeprefix("runs/") for artifact in artifacts]
 
 
-def test_runs_are_sorted_by_any_metric_and_the_last_ones_are_kept(home: Path) -> None:
+def test_runs_are_sorted_by_any_metric_and_the_first_or_newest_are_kept(home: Path) -> None:
     assert listed("sort=best", folder=home) == ["walk1/optimize", "walk2/optimize", "walk0/evaluate", "walk0/optimize"]
     assert listed("sort=-of.falls", folder=home) == ["walk2/optimize", "walk1/optimize", "walk0/optimize"]
-    assert listed("sort=best", "limit=2", folder=home) == ["walk0/evaluate", "walk0/optimize"]
+    assert listed("sort=-best", "limit=2", folder=home) == ["walk0/optimize", "walk0/evaluate"]
+    assert listed("sort=best", "limit=1", folder=home) == ["walk1/optimize"]
+    assert listed("sort=-made", "limit=1", folder=home) == listed("limit=1", folder=home) == listed(folder=home)[-1:]
 
 
 @pytest.mark.parametrize(
@@ -118,7 +120,7 @@ def test_diff_shows_what_differs_and_nothing_else(home: Path) -> None:
     assert "did you mean walk1" in refused("diff", "walk1", "walc1", folder=home)
 
 
-def test_diff_shows_a_quantity_in_one_unit(home: Path) -> None:
+def test_a_quantity_is_shown_in_one_unit(home: Path) -> None:
     for name, speed in (("slow", 0.2), ("fast", 0.25)):
         metrics = {"value": speed, "interval": [speed, None], "gain": {"share": speed}, "outcome": {"way [m]": speed}}
         stage = Measuring("evaluate", {"returned": metrics}, {}, Walk())
@@ -130,6 +132,11 @@ def test_diff_shows_a_quantity_in_one_unit(home: Path) -> None:
     assert rows["returned.gain.share"][-3:] == rows["returned.outcome.way [m]"][-3:] == ["0.2", "0.25", "+0.05"]
     metrics = json.loads(done("diff", "slow", "fast", "--json", folder=home).out)["metrics"]
     assert metrics["returned.value"] == [0.2, 0.25]
+    assert {"[cm/s]", "20", "25"} <= {*done("runs", "sort=returned.value", folder=home).out.split()}
+    for name in ("returned.value", "returned.value [cm/s]"):
+        assert listed(f"metric={name}>22", folder=home) == listed(f"sort=-{name}", "limit=1", folder=home) == ["fast"]
+    table = done("show", "slow", folder=home).out
+    assert "returned.value [cm/s]" in table and "[20, none]" in table
 
 
 def test_clean_removes_what_it_has_named_when_it_is_asked_to(home: Path) -> None:
