@@ -35,7 +35,7 @@ from gsl.storage.manifest import (
     read,
     strange_files,
 )
-from gsl.storage.references import RUNS, find_all, find_damaged, resolve, resolve_main
+from gsl.storage.references import RUNS, find_all, find_damaged, resolve_main
 
 
 def list_runs(words: Sequence[str], console: Console) -> None:
@@ -132,7 +132,7 @@ def open_artifact(reference: str, console: Console) -> None:
         ArtifactError: There is no such artifact, it has no page, or that was changed since it was written.
     """
     above = list((RUNS / reference).glob(f"[!.]*/{PAGE}"))
-    folder = above[0].parent if len(above) == 1 else resolve(reference)
+    folder = above[0].parent if len(above) == 1 else resolve_main(reference)
     page, stored = folder / PAGE, read(folder)
     if not (page.is_file() or PAGE in stored.files):
         raise ArtifactError(folder, f"has no page: {stored.kind} writes none; gsl show says what is in it")

@@ -164,6 +164,7 @@ def test_clean_leaves_work_that_a_process_is_at(home: Path) -> None:
 
 def test_clean_goes_to_stale_and_orphaned_artifacts_when_asked_and_leaves_foreign_files(home: Path) -> None:
     make("walk1/evaluate", "evaluate", {"best": 0.1}, above="walk1/optimize")
+    make("grandchild", "evaluate", {"best": 0.1}, above="walk1/evaluate")
     make("walk0/optimize", "optimize", {"best": 0.4}, force=True)
     (home / "runs/walk0/evaluate/mine.txt").write_text("notes")
     (home / "outside").mkdir()
@@ -174,6 +175,7 @@ def test_clean_goes_to_stale_and_orphaned_artifacts_when_asked_and_leaves_foreig
     (home / "runs/walk1/optimize").rmdir()
     assert "stale: runs/walk0/optimize was built anew" in done("clean", "stale=true", folder=home).out
     assert "orphaned: runs/walk1/optimize is gone" in done("clean", "orphaned=true", folder=home).out
+    assert "grandchild" in done("clean", "orphaned=true", folder=home).out
     done("clean", "stale=true", "orphaned=true", "--yes", folder=home)
     assert (home / "outside/keep").is_file() and not (home / "runs/.link.partial").is_symlink()
     assert [path.name for path in (home / "runs/walk0/evaluate").iterdir()] == ["mine.txt"]
@@ -185,8 +187,10 @@ def test_a_wrong_word_of_clean_is_one_line(home: Path) -> None:
     assert gsl("clean", "stale=perhaps", folder=home).code == 2
 
 
+@pytest.mark.parametrize("kind", ["iterate", "compare"])
 @pytest.mark.parametrize("command", ["show", "lineage"])
-def test_the_name_of_a_whole_run_means_its_iterate(home: Path, command: str) -> None:
-    make("whole/iteration_01/optimize", "optimize", {"best": 0.2})
-    make("whole/iterate", "iterate", {"best": 0.2})
-    assert "whole/iterate" in "".join(done(command, "whole", folder=home)[1:])
+def test_the_name_of_a_whole_run_means_its_main_artifact(home: Path, command: str, kind: str) -> None:
+    for number in (1, 2):
+        make(f"whole/trial_{number}/optimize", "optimize", {"best": 0.2})
+    make(f"whole/{kind}", kind, {"best": 0.2})
+    assert f"whole/{kind}" in "".join(done(command, "whole", folder=home)[1:])
