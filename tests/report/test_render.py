@@ -195,6 +195,7 @@ def test_render_shows_a_policy_on_both_sides(toy: Path, tmp_path: Path, capsys: 
         (["slow=0"], "slow"),
         (["slow=fast"], "must be a number"),
         (["slow"], "name=value"),
+        (["beside=first"], "beside: is for a log, and this is evaluate"),
     ],
 )
 def test_render_refuses_in_one_line(
