@@ -30,6 +30,7 @@ from gsl.report.console import Console
 from gsl.version import PACKAGE, __version__
 
 QUIET = {"--quiet", "-q"}
+NO_COMMAND = "No such command"  # how the usage error of typer begins
 
 app = typer.Typer(
     cls=Commands,
@@ -239,5 +240,7 @@ def _command(arguments: Sequence[str]) -> str:
 def _report_failure(failure: BaseException, console: Console, command: str) -> int:
     usage: Callable[[], str] | None = getattr(failure, "format_message", None)
     if usage is not None:
-        return console.error(" ".join(usage().split()), 2, command=command)
+        line = " ".join(usage().split())
+        more = " gsl --help lists them." if line.startswith(NO_COMMAND) and "Did you mean" not in line else ""
+        return console.error(line + more, 2, command=command)
     return report(failure, console, command=command)

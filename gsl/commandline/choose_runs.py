@@ -16,8 +16,10 @@ from typing import Annotated, Any
 from gsl.commandline.words import read_span
 from gsl.commandline.world_names import name_world
 from gsl.core.setting import component, setting
+from gsl.core.unit import Unit
 from gsl.core.validation import did_you_mean
 from gsl.errors import ArtifactError, ConfigError
+from gsl.report.headline import show_in_unit, title_in_unit, unit_of
 from gsl.storage.artifact import Artifact
 from gsl.storage.identity import flat
 from gsl.storage.references import RUNS, name_run
@@ -37,11 +39,11 @@ class Choice:
     kind: Annotated[str, setting("kinds of artifact, with commas between: iterate,optimize")] = ""
     name: Annotated[str, setting("part of the reference, or a pattern with *")] = ""
     world: Annotated[str, setting("one of its worlds, or a robot or effect of them")] = ""
-    metric: Annotated[str, setting("a metric that it has, or a condition: 'returned.value>0.2'")] = ""
+    metric: Annotated[str, setting("a metric that it has, or a condition, in the unit shown: 'returned.value>20'")] = ""
     newer: Annotated[str, setting("made within this time: 90s, 30min, 12h, 7d, 2w")] = ""
     older: Annotated[str, setting("made before this time")] = ""
-    sort: Annotated[str, setting("made, took, name, kind or a metric; -NAME turns it round")] = "made"
-    limit: Annotated[int, setting("the last so many; 0 for all", ge=0)] = 0
+    sort: Annotated[str, setting("made, took, name, kind or a metric; -NAME turns it round")] = ""
+    limit: Annotated[int, setting("so many rows: the first with sort=, else the newest; 0 for all", ge=0)] = 0
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,16 @@ class Run:
         except ArtifactError:
             return {}
         return {name: float(value) for name, value in values.items() if _is_number(value)}
+
+    @property
+    def unit(self) -> Unit:
+        """Of its task."""
+        return unit_of(self.artifact)
+
+    @cached_property
+    def shown(self) -> dict[str, float]:
+        """Its metrics as people are shown them: values of its task in the task's unit."""
+        return dict(zip(self.metrics, show_in_unit(self.metrics, self.unit).values(), strict=True))
 
     @cached_property
     def worlds(self) -> set[str]:
@@ -100,11 +112,17 @@ def choose(artifacts: Sequence[Artifact], choice: Choice, now: datetime) -> tupl
         and _fits_age(run, now, least, most)
     ]
     if asked:
-        _check_metric("metric", asked, runs)
-        runs = [run for run in runs if asked in run.metrics and condition(run.metrics[asked])]
-    key = choice.sort.removeprefix("-")
-    runs = sorted(runs, key=_order(key, runs), reverse=choice.sort.startswith("-"))
-    return (runs[-choice.limit :] if choice.limit else runs), asked or (None if key in _ORDERS else key)
+        asked = _find_metric("metric", asked, runs)
+        runs = [run for run in runs if asked in run.shown and condition(run.shown[asked])]
+    key = choice.sort.removeprefix("-") or "made"
+    if key not in _ORDERS:
+        key = _find_metric("sort", key, runs, more=tuple(_ORDERS))
+        runs = [run for run in runs if key in run.metrics]
+    order = _ORDERS.get(key, lambda run: run.shown[key])
+    runs = sorted(runs, key=order, reverse=choice.sort.startswith("-"))
+    if choice.limit:
+        runs = runs[: choice.limit] if choice.sort else runs[-choice.limit :]
+    return runs, asked or (None if key in _ORDERS else key)
 
 
 _ORDERS: Mapping[str, Callable[[Run], Any]] = {
@@ -113,15 +131,6 @@ _ORDERS: Mapping[str, Callable[[Run], Any]] = {
     "name": lambda run: run.name,
     "kind": lambda run: (run.artifact.manifest.kind, run.artifact.manifest.created),
 }
-
-
-def _order(key: str, runs: list[Run]) -> Callable[[Run], Any]:
-    """Return what is sorted by; of a metric, only those that have it stay in `runs`."""
-    if key in _ORDERS:
-        return _ORDERS[key]
-    _check_metric("sort", key, runs, more=tuple(_ORDERS))
-    runs[:] = [run for run in runs if key in run.metrics]
-    return lambda run: run.metrics[key]
 
 
 def _read_condition(text: str) -> tuple[str, Callable[[float], bool]]:
@@ -144,13 +153,16 @@ def _check_words(setting: str, text: str, there: Collection[str]) -> set[str]:
     return words
 
 
-def _check_metric(setting: str, name: str, runs: Sequence[Run], more: tuple[str, ...] = ()) -> None:
+def _find_metric(setting: str, name: str, runs: Sequence[Run], more: tuple[str, ...] = ()) -> str:
+    """Return the name of a metric, which may be asked for with its unit, as the list shows it."""
     names = {metric for run in runs for metric in run.metrics}
-    if runs and name not in names:
+    titles = {title_in_unit(metric, run.unit): metric for run in runs for metric in run.metrics}
+    if runs and name not in names | titles.keys():
         ends = sorted(metric for metric in names if name in metric.split("."))[:3]
         near = f"; did you mean {' or '.join(ends)}?" if ends else did_you_mean(name, {*names, *more})
         near = f"{near} There" if near.startswith("; did") else "; there"
         raise ConfigError(setting, f"none of these artifacts has this metric{near} {_list(runs)}", given=name)
+    return name if name in names else titles.get(name, name)
 
 
 def find_deeper(name: str, runs: Sequence[Run]) -> list[str]:

@@ -30,6 +30,7 @@ from gsl.storage.identity import flat
 
 RUNS = Path("runs")
 WORKERS = "workers"  # setting of whatever rolls out or runs trials
+GAT = "grounding.forward_model"  # of which gsl optimize is asked first, by its default grounding
 LONGEST = 200  # bytes of a folder's name; file systems take 255, and temporary folders have longer ones
 
 
@@ -182,7 +183,8 @@ def _name_setting(error: ArtifactError, settings: Mapping[str, Any], name: str) 
     keys = (
         [key for key, value in flat(settings).items() if value == reference] if reference.startswith(f"{name}/") else []
     )
-    return InputError(f"{error}; {keys[0]}=RUN takes another run's") if keys else error
+    other = "; grounding=servo needs gsl train-servo in place of it" if keys[:1] == [GAT] else ""
+    return InputError(f"{error}; {keys[0]}=RUN takes another run's{other}") if keys else error
 
 
 def _missing(value: Any, path: str) -> Iterator[str]:

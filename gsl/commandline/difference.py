@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
+from gsl.core.setting import REQUIRED, settings_of
+from gsl.core.trust import TARGET, class_of, is_ours
 from gsl.core.unit import Unit
-from gsl.errors import ArtifactError
+from gsl.errors import ArtifactError, ConfigError
 from gsl.report.account import plain
 from gsl.report.console import Console
 from gsl.report.diagnosis_two import set_side_by_side, table_of_two
@@ -16,12 +18,14 @@ from gsl.report.headline import show_in_unit, unit_of
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import REPORT, report_of
+from gsl.storage.documents import plain as plain_types
 from gsl.storage.hashing import SHORT
 from gsl.storage.identity import flat
 from gsl.storage.references import name_run, resolve_main
 
 Pair = tuple[Any, Any]
 ABSENT = "-"
+NO_SETTING = "not a setting"
 
 
 def compare(first: str, second: str, console: Console) -> None:
@@ -41,7 +45,11 @@ def compare(first: str, second: str, console: Console) -> None:
     made = left.manifest, right.manifest
     parents = [{parent.role: parent.hash[:SHORT] for parent in each.parents} for each in made]
     roles = parents[0].keys() & parents[1].keys()  # where such a parent lies is told by its contents
-    settings = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (left, right)]
+    configs = [{key: value for key, value in flat(each.config).items() if key not in roles} for each in (left, right)]
+    settings = [
+        {**own, **_find_defaults(each.config, other.keys() - own.keys())}
+        for each, own, other in zip((left, right), configs, reversed(configs), strict=True)
+    ]
     software = [{**each.versions, "sources of gsl": each.sources[:SHORT], "kind": each.kind} for each in made]
     parts = {
         "settings": _differ(*settings),
@@ -81,6 +89,28 @@ def _read_report(folder: Path) -> dict[str, Any]:
         return report_of(folder)
     except (OSError, ValueError) as error:
         raise ArtifactError(folder / REPORT, "is damaged; diagnose again with force=true") from error
+
+
+def _find_defaults(config: Mapping[str, Any], absent: Iterable[str]) -> dict[str, Any]:
+    """Return what settings are that a configuration does not name: the default, or that its class has none."""
+    values = {}
+    for name in absent:
+        parent, _, last = name.rpartition(".")
+        node: Any = config
+        for key in filter(None, parent.split(".")):
+            node = node.get(key) if isinstance(node, Mapping) else None
+        target = node.get(TARGET) if isinstance(node, Mapping) else None
+        if not isinstance(target, str) or not is_ours(target):  # nothing of others' is imported to compare
+            continue
+        try:
+            declared = settings_of(class_of(target))
+        except (ConfigError, ValueError, TypeError, AttributeError):  # of another version
+            continue
+        if last not in declared:
+            values[name] = NO_SETTING
+        elif declared[last].default is not REQUIRED:
+            values[name] = plain_types(declared[last].default)
+    return values
 
 
 def _differ(before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Pair]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -42,6 +42,7 @@ from gsl.worlds.external import ExternalRobot
 from gsl.worlds.randomised import RandomisedWorld
 
 LOGS = ("collect", "import")
+LOG, WALK = ("episode", "beside"), ("policy", "seed")  # settings of what is seen of either
 SHOWN = (*LOGS, "evaluate", "iterate", "optimize")
 
 
@@ -109,10 +110,19 @@ def assemble(reference: str, subject: Subject, words: Sequence[str], console: Co
     folder = resolve_main(reference, kind=SHOWN)
     kind = manifest.read(folder).kind
     console.status(f"{folder.as_posix()}: {kind}")
+    _check_subject(kind, read_settings(words, "render"))
     cast = _play_logs(folder, subject, trust) if kind in LOGS else _walk(folder, kind, subject, trust, console)
     if not any(link.looks for link in cast.robot.links.values()):
         raise InputError(f"{cast.robot.name}: none of its links has a shape that could be shown")
     return cast
+
+
+def _check_subject(kind: str, typed: Collection[str]) -> None:
+    """Refuse settings of a walk for a log, and the other way round, which would do nothing."""
+    others, what = (WALK, "a walk") if kind in LOGS else (LOG, "a log")
+    for name in others:
+        if name in typed:
+            raise ConfigError(name, f"is for {what}, and this is {kind}; leave it out")
 
 
 def read_settings(words: Sequence[str], command: str) -> dict[str, str]:

@@ -19,7 +19,7 @@ from gsl.core.words import size
 from gsl.errors import ArtifactError, InputError
 from gsl.report.account import account, flat, plain
 from gsl.report.console import Console
-from gsl.report.headline import headline
+from gsl.report.headline import headline, title_in_unit
 from gsl.storage.artifact import Artifact
 from gsl.storage.hashing import PAGE, SHORT
 from gsl.storage.identity import content_hash
@@ -35,7 +35,7 @@ from gsl.storage.manifest import (
     read,
     strange_files,
 )
-from gsl.storage.references import RUNS, find_all, find_damaged, resolve, resolve_main
+from gsl.storage.references import RUNS, find_all, find_damaged, resolve_main
 
 
 def list_runs(words: Sequence[str], console: Console) -> None:
@@ -53,14 +53,24 @@ def list_runs(words: Sequence[str], console: Console) -> None:
         console.status(f"{folder.as_posix()}: its manifest cannot be read; gsl verify says why")
     artifacts = find_all()
     chosen, metric = choose(artifacts, choice, datetime.now(UTC))
-    columns = ["reference", "kind", "made", "took", *([metric] if metric else []), "result"]
-    rows = [(*_facts(run), *([plain(run.metrics[metric])] if metric else []), headline(run.artifact)) for run in chosen]
-    title = f"artifacts below {RUNS}/" + (f": {len(chosen)} of {len(artifacts)}" if words else "")
+    titles = {title_in_unit(metric, run.unit) for run in chosen} if metric else set()
+    title = titles.pop() if len(titles) == 1 else metric
+    columns = ["reference", "kind", "made", "took", *([title] if title else []), "result"]
+    rows = [(*_facts(run), *_value(run, metric, title), headline(run.artifact)) for run in chosen]
+    heading = f"artifacts below {RUNS}/" + (f": {len(chosen)} of {len(artifacts)}" if words else "")
     deeper = find_deeper(metric, [Run(artifact) for artifact in artifacts]) if metric else []
     if rows:
-        console.table(title, columns, rows, f"other artifacts have {', '.join(deeper[:3])}" if deeper else None)
+        console.table(heading, columns, rows, f"other artifacts have {', '.join(deeper[:3])}" if deeper else None)
     empty = f"none of the {len(artifacts)} artifacts below {RUNS}/ fits" if artifacts else "no artifacts below runs/"
     console.result({"artifacts": [_document(run, metric) for run in chosen]}, text="" if rows else empty)
+
+
+def _value(run: Run, metric: str | None, title: str | None) -> list[str]:
+    """Return the cell of a metric, with its unit where not all rows have the same one."""
+    if not metric:
+        return []
+    value, unit = plain(run.shown[metric]), run.unit.name
+    return [value if title_in_unit(metric, run.unit) == title else f"{value} {unit}"]
 
 
 def _facts(run: Run) -> tuple[str, str, str, str]:
@@ -122,7 +132,7 @@ def open_artifact(reference: str, console: Console) -> None:
         ArtifactError: There is no such artifact, it has no page, or that was changed since it was written.
     """
     above = list((RUNS / reference).glob(f"[!.]*/{PAGE}"))
-    folder = above[0].parent if len(above) == 1 else resolve(reference)
+    folder = above[0].parent if len(above) == 1 else resolve_main(reference)
     page, stored = folder / PAGE, read(folder)
     if not (page.is_file() or PAGE in stored.files):
         raise ArtifactError(folder, f"has no page: {stored.kind} writes none; gsl show says what is in it")
@@ -168,7 +178,8 @@ def _setting(name: str, value: Any) -> tuple[str, str]:
     if not isinstance(value, Mapping):
         return name, plain(value)
     kind = str(value.get("_target_", "")).rpartition(".")[2]
-    inner = [f"{key}={text}" for key, text in flat({k: v for k, v in value.items() if k != "_target_"}) if key]
+    inside = {key: entry for key, entry in value.items() if key != "_target_"}
+    inner = [f"{key}={plain(entry)}" for key, entry in flat(inside) if key]
     return name, " ".join([kind, *inner]).strip()
 
 

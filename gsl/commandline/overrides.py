@@ -4,6 +4,7 @@ sim=nao_ideal                           world@sim=nao_ideal
 world.effects.backlash.width=0.02       ++world.effects.backlash.width=0.02
 experiment=arm                          +experiment=arm
 out=runs/a                              ++out=runs/a
+methods=none,ane                        ~methods.gat ... +grounding@methods.ane=ane
 mapping=logs/my_arm.yaml                mapping=<from the folder of the mappings>/logs/my_arm
 """
 
@@ -27,6 +28,9 @@ FILE_GROUPS = ("mapping",)
 """Groups of which a path to a yaml file of one's own is an option, too."""
 _ROOT = "../" * 64  # from whatever folder of configuration, up to the root of the file system
 
+FAMILIES = ("methods", "worlds")  # settings of a study that hold many choices from one group, each under its name
+_NAMES = re.compile(r"\w+(?: *, *\w+)*")
+
 _EFFECT = re.compile(r"(?:.*\.)?(?<!methods\.)effects\.[A-Za-z_]\w*")  # `methods.effects` is a method of that name
 
 
@@ -41,7 +45,11 @@ def rewrite(arguments: Iterable[str], chosen: Collection[str]) -> list[str]:
         ConfigError: An argument is not of the form key=value.
     """
     roles = {choice.partition("@")[2]: choice for choice in chosen if "@" in choice}
-    return [_rewritten(argument, roles, chosen) for argument in arguments]
+    words: list[str] = []
+    for argument in arguments:
+        family = _expand(argument, chosen)
+        words += [_rewritten(argument, roles, chosen)] if family is None else family
+    return words
 
 
 def file_of(command: str) -> str:
@@ -58,6 +66,19 @@ def effect_path(key: str) -> str:
     """Return the dotted path of the effect that a key is about, `world.effects.backlash`, or nothing."""
     match = _EFFECT.match(key)
     return match.group(0) if match else ""
+
+
+def _expand(argument: str, chosen: Collection[str]) -> list[str] | None:
+    """Return what leaves only the named members in a family and adds those that are new; None of another argument."""
+    key, _, value = argument.partition("=")
+    members = {choice.rpartition(".")[2]: choice for choice in chosen if choice.partition("@")[2].startswith(f"{key}.")}
+    plain = value.strip("'\" ").removeprefix("[").removesuffix("]").strip()
+    if key not in FAMILIES or not members or not _NAMES.fullmatch(plain):
+        return None
+    names = dict.fromkeys(re.split(" *, *", plain))
+    group = next(iter(members.values())).partition("@")[0]
+    dropped = [f"~{key}.{member}" for member in members if member not in names]
+    return [*dropped, *(f"+{group}@{key}.{name}={name}" for name in names if name not in members)]
 
 
 def _rewritten(argument: str, roles: Mapping[str, str], chosen: Collection[str]) -> str:

@@ -16,7 +16,7 @@ from gsl.report.console import Console
 from gsl.storage import manifest
 from gsl.storage.artifact import CONFIG, Artifact, build
 from gsl.storage.hashing import CIRCUMSTANCES, SHORT
-from gsl.storage.references import resolve
+from gsl.storage.references import resolve_main
 from gsl.worlds.external import ExternalRobot, asking
 
 AGAIN = "_rerun"
@@ -39,7 +39,7 @@ def rerun(reference: str, settings: Sequence[str], console: Console) -> int:
     words = dict(word.partition("=")[::2] for word in settings)
     if unknown := sorted(words.keys() - {"out", "trust"}):
         raise ConfigError(unknown[0], "is no setting of gsl rerun, which takes out= and trust=")
-    folder = resolve(reference)
+    folder = resolve_main(reference)
     old = Artifact(folder, manifest.read(folder))
     manifest.check_intact(folder, old.manifest, only=(CONFIG,))  # other settings would be another run
     damaged = manifest.find_damage(folder, old.manifest)

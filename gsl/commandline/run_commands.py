@@ -20,8 +20,8 @@ def add_run_commands(app: typer.Typer) -> None:
 
 
 _RUNS = (
-    "kind=iterate, name= (part of it, or *), world=, metric='returned.value>0.2', newer=7d, older=2h; sort= made, "
-    "took, name, kind or a metric, -NAME turns it round; limit=20"
+    "kind=iterate, name= (part of it, or *), world=, metric='returned.value>20', newer=7d, older=2h; sort= made, "
+    "took, name, kind or a metric, -NAME turns it round; limit=20: the first, without sort= the newest"
 )
 
 

@@ -64,10 +64,12 @@ def component(cls: type) -> Any:
 
 
 def _check_number(cls: Any, value: Any, about: ValidationInfo) -> Any:
-    """Refuse true and false where a number is due, which Python takes for 1 and 0, and counts that no library takes."""
+    """Refuse true and false where a number is due, other words where they are due, and counts that no library takes."""
     kind = cls.__pydantic_fields__[about.field_name].annotation
     if isinstance(value, bool) and kind in (int, float):
         raise PydanticCustomError("truth_value", "Input should be a number")
+    if kind is bool and isinstance(value, str) and value.lower() not in ("true", "false"):
+        raise PydanticCustomError("bool_parsing", "Input should be true or false")
     if kind is int and isinstance(value, int) and value > MOST:
         raise PydanticCustomError("less_than_equal", "Input is too large", {"le": MOST})
     return value

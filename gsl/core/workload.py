@@ -105,6 +105,7 @@ class Workload:
         self._alone = self._warm = False
         self._share = self._free = self._begun = self._last = 0.0
         self._phase, self._entered = "", 0.0
+        self._around = "", 0.0  # name of the work, and since when, for when no phase of it has begun
         self._looking, self._looked = threading.Lock(), self.clock()
         self._compiling, self._compiled = False, 0.0
 
@@ -133,12 +134,12 @@ class Workload:
     @contextmanager
     def at_work(self, name: str) -> Iterator[None]:
         """Within, the work has this name wherever nobody knows more of it."""
-        before = self._phase, self._entered
-        self._phase, self._entered = name, self.clock()
+        before = self._phase, self._entered, self._around
+        self._phase, self._around = "", (name, self.clock())
         try:
             yield
         finally:
-            self._phase, self._entered = before
+            self._phase, self._entered, self._around = before
 
     def enter(self, phase: str) -> None:
         """Name what is done now; how long it takes is not known."""
@@ -179,7 +180,7 @@ class Workload:
         try:
             yield self._loop
         finally:
-            self._loop = before
+            self._loop, self._phase = before, ""  # what was done before the loop is long over
 
     def step(self, steps: int, *, worked: bool) -> None:
         """Note steps of the present loop."""
@@ -218,7 +219,8 @@ class Workload:
         plans, loop, left, compiling = [*self._plans], self._loop, self.left(), is_compiling()
         whole = [f"{100.0 * self._share:.0f} % done"] if plans and plans[0].parts else []
         whole += [f"about {duration(left)} left"] if left and left >= 0.5 and not compiling else []
-        phase = [] if loop or not self._phase else [self._phase, duration(self.clock() - self._entered)]
+        name, since = (self._phase, self._entered) if self._phase or plans else self._around
+        phase = [] if loop or not name else [name, duration(self.clock() - since)]
         places = [*(plan.words() for plan in plans if plan.noun), *(loop.words() if loop else phase)]
         places += [COMPILING] if compiling else []
         outcome = [self.best, loop.falls() if loop else ""] if plans else []

@@ -18,7 +18,7 @@ from gsl.models.free_run import TICKS
 from gsl.report.audit import audit_table
 from gsl.report.diagnosis_text import summary_lines
 from gsl.report.evaluation_cells import cells, columns, name_policy, outcomes_beside
-from gsl.report.headline import unit_of
+from gsl.report.headline import show_in_unit, unit_of
 from gsl.report.markdown import read_table
 from gsl.report.tables import Table
 from gsl.robots import catalogue
@@ -223,16 +223,17 @@ def _markdown(path: Path) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
 
 
 def _plain(artifact: Artifact) -> Table:
-    return Table("metrics", ("metric", "value"), list(flat(artifact.metrics)))
+    shown = show_in_unit(dict(flat(artifact.metrics)), unit_of(artifact))
+    return Table("metrics", ("metric", "value"), [(name, plain(value)) for name, value in shown.items()])
 
 
-def flat(values: Any, path: str = "") -> Iterator[tuple[str, str]]:
+def flat(values: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """Yield one row a value, with its dotted name."""
     if isinstance(values, dict) and values:
         for key, value in values.items():
             yield from flat(value, f"{path}.{key}".lstrip("."))
     else:
-        yield path, plain(values)
+        yield path, values
 
 
 def plain(value: Any) -> str:

@@ -25,6 +25,7 @@ STEPS = (0.05, 0.1, 0.25, 0.5, 1.0, 2.0)  # of a ruler [m]
 MARKS = 14  # of a ruler, at most
 LETTERS, SMALL = 15, 12  # [pixels]
 PLACE = 150  # of the way and the time at the right [pixels]
+LIFT = 0.05  # of a robot that is held, above the floor on which another one walks, in its heights
 STILL = 0.01  # way of a base that is held [m]
 
 
@@ -38,6 +39,7 @@ class Scene:
         beside: Whether strips stand side by side.
         marks: Where the ruler has its marks [m], shape (n, 3).
         start: Where the way begins [m].
+        held: At which height a base is shown that is held in the air [m].
     """
 
     view: View
@@ -46,6 +48,7 @@ class Scene:
     beside: bool
     marks: np.ndarray
     start: float
+    held: float
 
     @classmethod
     def of(cls, robot: Robot, trajectories: Sequence[Trajectory], width: int) -> Scene:
@@ -54,9 +57,11 @@ class Scene:
         size = high - low
         way = np.concatenate([places(trajectory) for trajectory in trajectories])
         walking = any(walks(trajectory) for trajectory in trajectories)
-        span = size[2] if walking else max(size[2], size[0])  # in the air limbs may turn from lying to standing
+        in_the_air = not all(walks(trajectory) for trajectory in trajectories)
+        span = max(size[2], size[0]) if in_the_air else size[2]  # there limbs may turn from lying to standing
         first, last = way[:, 0].min() - 0.75 * span, way[:, 0].max() + 0.75 * span
         floor = 0.0 if walking else HELD_AT + low[2]
+        held = float(LIFT * size[2] - low[2]) if walking else HELD_AT
         tall = ROOM * span
         ratio = float(np.clip((last - first) / tall, 0.8, WIDEST))
         beside = ratio < FLATTEST
@@ -68,7 +73,7 @@ class Scene:
         view = View(middle, distance, yaw=90.0, pitch=-8.0, opening=OPENING)
         along = _ruler(float(first), float(last), start)
         marks = np.column_stack([along, np.full(len(along), side - 0.3 * size[2]), np.full(len(along), floor)])
-        return cls(view, wide, _even(wide / ratio), beside, marks, start)
+        return cls(view, wide, _even(wide / ratio), beside, marks, start, held)
 
 
 class Strip:
@@ -96,7 +101,7 @@ class Strip:
     ) -> None:
         self._camera, self._robot, self._scene = camera, robot, scene
         self._joints, self._title, self._about, self._trajectory = joints, title, about, trajectory
-        self._places, self._turns = places(trajectory), turns(trajectory)
+        self._places, self._turns = places(trajectory, scene.held), turns(trajectory)
         self._ruler = camera.project(scene.marks, scene.view, scene.width, scene.height)
         fell = trajectory.fell
         self._fall = math.inf if fell is None or not fell.any() else float(trajectory.time[int(np.argmax(fell))])
@@ -154,10 +159,10 @@ def see(background: np.ndarray, *columns: float) -> np.ndarray:
     return shown
 
 
-def places(trajectory: Trajectory) -> np.ndarray:
-    """Return where the base is [m], shape (T + 1, 3); where nobody knows, held in the air."""
+def places(trajectory: Trajectory, held: float = HELD_AT) -> np.ndarray:
+    """Return where the base is [m], shape (T + 1, 3); where nobody knows, held in the air at a height [m]."""
     if not walks(trajectory):
-        return np.tile([0.0, 0.0, HELD_AT], (len(trajectory.time), 1))
+        return np.tile([0.0, 0.0, held], (len(trajectory.time), 1))
     return np.column_stack([trajectory.sensors[f"base.position.{axis}"] for axis in "xyz"])
 
 

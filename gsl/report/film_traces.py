@@ -22,7 +22,7 @@ def draw_traces(
 
     Args:
         joints: Names of the columns of positions.
-        shots: What is shown in the film; the command is of the first.
+        shots: What is shown in the film; a command that differs from that of the first is drawn as well.
         width: [pixels].
         slides: Names of the joints that slide.
     """
@@ -45,6 +45,9 @@ def draw_traces(
         for shot in shots:
             way = factor * shot.trajectory.position[:, joint]
             axes.plot(shot.trajectory.time, way, color=shot.colour, linewidth=1.4, label=shot.where or shot.who)
+            own = factor * shot.trajectory.action[:, joint]
+            if not np.array_equal(own, asked):
+                axes.plot(shot.trajectory.time[:-1], own, ":", color=shot.colour, linewidth=1.0, label="its command")
         axes.set_xlim(0.0, max(float(shot.trajectory.time[-1]) for shot in shots))
         title = f"{shorten(joints[joint], (right - LEFT - TIME) / LETTER)} [{unit}]"
         figure.text(LEFT / width, 0.03, title, fontsize=8)  # upright it would not fit beside so low a picture

@@ -24,13 +24,28 @@ def unit_of(artifact: Artifact) -> Unit:
 
 def show_in_unit(metrics: Metrics, unit: Unit) -> dict[str, Any]:
     """Return metrics by dotted name as people are shown them: values of the task in its unit, which their names say."""
-    shown = {}
-    for name, value in metrics.items():
-        parts = [part for part in name.split(".") if not part.isdecimal()]
-        valued = parts[-1] in VALUED or tuple(parts[-2:]) == PROMISED
-        number = isinstance(value, int | float) and not isinstance(value, bool)
-        shown[in_unit(name, unit.name) if valued else name] = unit.factor * value if valued and number else value
-    return shown
+    return {title_in_unit(name, unit): _scale(value, _factor(name, unit)) for name, value in metrics.items()}
+
+
+def title_in_unit(name: str, unit: Unit) -> str:
+    """Return the dotted name of a metric, with the unit of the task if it is a value of it."""
+    return in_unit(name, unit.name) if _is_value(name) else name
+
+
+def _factor(name: str, unit: Unit) -> float:
+    return unit.factor if _is_value(name) else 1.0
+
+
+def _is_value(name: str) -> bool:
+    parts = [part for part in name.split(".") if not part.isdecimal()]
+    return parts[-1] in VALUED or tuple(parts[-2:]) == PROMISED
+
+
+def _scale(value: Any, factor: float) -> Any:
+    if isinstance(value, list):
+        return [_scale(entry, factor) for entry in value]
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return factor * value if number and factor != 1.0 else value
 
 
 def headline(artifact: Artifact) -> str:

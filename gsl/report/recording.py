@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from gsl.core.body import MESH, Robot, Shape, lump
 from gsl.core.dynamics import forward_kinematics
 from gsl.core.trajectory import Trajectory
-from gsl.errors import InputError
+from gsl.errors import InputError, shorten
 from gsl.report.film import Shot
 from gsl.report.film_strip import places, turns, walks
 from gsl.report.shown import scale_of
@@ -59,7 +59,8 @@ def record_shots(robot: Robot, joints: Sequence[str], shots: Sequence[Shot], pat
         try:
             recording.spawn()
         except (RuntimeError, OSError) as error:
-            raise InputError(f"the viewer cannot be started ({error}); write a file with out=motion.rrd") from error
+            why = shorten(" ".join(str(error).split()))
+            raise InputError(f"write a file with out=motion.rrd; the viewer cannot be started: {why}") from error
     recording.send_recording_name(" and ".join(shot.title for shot in shots))
     _arrange(recording, joints, robot.slides)
     recording.log("world", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)

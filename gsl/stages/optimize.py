@@ -118,6 +118,7 @@ class Optimize:
             self.policy.names, first.tolist(), vector(self.policy, best).tolist(), self.policy.scale.tolist()
         )
         tried, check = [theta.name for theta in thetas], read_check(folder / REPORT)
+        console.phase("drawing the page")
         write_search_page(
             folder,
             winners,

@@ -7,13 +7,14 @@ import functools
 import os
 import re
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from gsl.errors import ArtifactError
 from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
 from gsl.storage.lineage import out_of_date
 from gsl.storage.references import find_all
 from gsl.storage.whole import is_alive
@@ -49,16 +50,35 @@ def find_leftovers(runs: Path) -> list[Leftover]:
 
 def find_stale(runs: Path, *, stale: bool, orphaned: bool) -> list[Leftover]:
     """Return artifacts below `runs` that were made from one that was built anew since, or from one that is gone."""
-    reasons: dict[Path, str] = {}
+    artifacts, reasons = find_all(runs), dict[Path, str]()
+    if orphaned:
+        reasons |= _find_orphans(artifacts)
     read = functools.cache(manifest.read)
-    for artifact in find_all(runs):
-        folder, made = artifact.folder, artifact.manifest
-        above = [parent.path for parent in made.parents if not (folder / parent.path).exists()]
-        if orphaned and above:
-            reasons[folder] = f"orphaned: {Path(os.path.normpath(folder / above[0])).as_posix()} is gone"
-        elif stale and (change := out_of_date(folder, read, damaged=False)):
+    for folder in (artifact.folder for artifact in artifacts):
+        if folder not in reasons and stale and (change := out_of_date(folder, read, damaged=False)):
             reasons[folder] = f"stale: {change}"
     return [Leftover(folder, why, _measure_artifact(folder), artifact=True) for folder, why in reasons.items()]
+
+
+def _find_orphans(artifacts: Sequence[Artifact]) -> dict[Path, str]:
+    """Return which artifacts were made from one that is gone, or from such an orphan, and why each is one."""
+    above = {
+        artifact.folder: [Path(os.path.normpath(artifact.folder / parent.path)) for parent in artifact.manifest.parents]
+        for artifact in artifacts
+    }
+    reasons = {
+        folder: f"orphaned: {gone[0].as_posix()} is gone"
+        for folder, places in above.items()
+        if (gone := [place for place in places if not place.exists()])
+    }
+    waiting = list(reasons)
+    while waiting:
+        orphan = waiting.pop(0)
+        for folder, places in above.items():
+            if folder not in reasons and any(place.is_relative_to(orphan) for place in places):
+                reasons[folder] = f"orphaned: {orphan.as_posix()}, from which it was made, is an orphan"
+                waiting.append(folder)
+    return reasons
 
 
 def remove(leftover: Leftover, runs: Path) -> bool:

@@ -89,7 +89,10 @@ def find_all(runs: Path = RUNS) -> list[Artifact]:
 
 
 def resolve_main(reference: str, *, kind: str | tuple[str, ...] | None = None) -> Path:
-    """Return the folder of the artifact that is meant: of a whole run its `iterate`, else the only one of `kind`.
+    """Return the folder of the artifact that is meant: of a whole run its main one.
+
+    That is its `iterate`, else the only artifact of `kind`, else the only one directly in the folder of the run, such
+    as its `compare`, which has built those below.
 
     Raises:
         ArtifactError: There is no such artifact, or several fit.
@@ -97,7 +100,15 @@ def resolve_main(reference: str, *, kind: str | tuple[str, ...] | None = None) -
     try:
         place = resolve(reference, kind="iterate")
     except ArtifactError:
-        place = resolve(reference, kind=kind)
+        try:
+            place = resolve(reference, kind=kind)
+        except ArtifactError:
+            run = _place(reference, RUNS)
+            kinds = (kind,) if isinstance(kind, str) else kind
+            near = [each for each in _artifacts(run) if each.folder.parent == run]
+            if len(near) != 1 or (kinds and near[0].manifest.kind not in kinds):
+                raise
+            place = near[0].folder
     return place.parent if place.is_file() else place
 
 

@@ -33,6 +33,16 @@ def test_an_argument_becomes_what_hydra_wants(typed: str, expected: str) -> None
     assert rewrite([typed], CHOSEN) == [expected]
 
 
+@pytest.mark.parametrize("typed", ["methods=none,ane", "methods=[none, ane]", "methods='[none,ane]'"])
+def test_a_list_of_methods_leaves_those_and_adds_what_is_new(typed: str) -> None:
+    chosen = ("grounding@methods.none", "grounding@methods.gat", "world@worlds.nao_worn", "world@sim")
+    once = rewrite([typed], chosen)
+    assert once == ["~methods.gat", "+grounding@methods.ane=ane"]
+    assert rewrite(once, chosen) == once
+    assert rewrite(["worlds=nao_worn"], chosen) == []
+    assert rewrite(["methods={none: 1}"], chosen) == ["methods={none: 1}"]
+
+
 def test_an_experiment_of_the_defaults_list_is_an_ordinary_choice() -> None:
     assert rewrite(["experiment=arm"], [*CHOSEN, "experiment"]) == ["experiment=arm"]
 

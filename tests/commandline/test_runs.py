@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from commands import done, gsl, refused
+from commands import done, refused
 
 from gsl.storage.artifact import build
 from gsl.tasks.walk import Walk
@@ -60,10 +60,12 @@ def listed(*words: str, folder: Path) -> list[str]:
     return [artifact["folder"].removeprefix("runs/") for artifact in artifacts]
 
 
-def test_runs_are_sorted_by_any_metric_and_the_last_ones_are_kept(home: Path) -> None:
+def test_runs_are_sorted_by_any_metric_and_the_first_or_newest_are_kept(home: Path) -> None:
     assert listed("sort=best", folder=home) == ["walk1/optimize", "walk2/optimize", "walk0/evaluate", "walk0/optimize"]
     assert listed("sort=-of.falls", folder=home) == ["walk2/optimize", "walk1/optimize", "walk0/optimize"]
-    assert listed("sort=best", "limit=2", folder=home) == ["walk0/evaluate", "walk0/optimize"]
+    assert listed("sort=-best", "limit=2", folder=home) == ["walk0/optimize", "walk0/evaluate"]
+    assert listed("sort=best", "limit=1", folder=home) == ["walk1/optimize"]
+    assert listed("sort=-made", "limit=1", folder=home) == listed("limit=1", folder=home) == listed(folder=home)[-1:]
 
 
 @pytest.mark.parametrize(
@@ -118,7 +120,23 @@ def test_diff_shows_what_differs_and_nothing_else(home: Path) -> None:
     assert "did you mean walk1" in refused("diff", "walk1", "walc1", folder=home)
 
 
-def test_diff_shows_a_quantity_in_one_unit(home: Path) -> None:
+def test_diff_knows_defaults_and_what_is_no_setting(home: Path) -> None:
+    world = {"_target_": "gsl.worlds.bullet.BulletWorld", "robot": "nao"}
+    bare, servo = ({"_target_": f"gsl.grounding.{name}"} for name in ("none.NoGrounding", "servo.LearnedServo"))
+    configs = {
+        "old": {"world": world, "grounding": bare},
+        "new": {"world": {**world, "servo_member": 0, "motors": "velocity"}, "grounding": {**servo, "noise": 0.2}},
+    }
+    for place, config in configs.items():
+        stage = Measuring("evaluate", {}, {})
+        build(stage, config=config, out=Path("runs") / place, command="gsl evaluate", force=False, console=None)  # type: ignore[arg-type]
+    settings = json.loads(done("diff", "old", "new", "--json", folder=home).out)["settings"]
+    assert settings["world.motors"] == ["servo", "velocity"]
+    assert "world.servo_member" not in settings
+    assert settings["grounding.noise"] == ["not a setting", 0.2]
+
+
+def test_a_quantity_is_shown_in_one_unit(home: Path) -> None:
     for name, speed in (("slow", 0.2), ("fast", 0.25)):
         metrics = {"value": speed, "interval": [speed, None], "gain": {"share": speed}, "outcome": {"way [m]": speed}}
         stage = Measuring("evaluate", {"returned": metrics}, {}, Walk())
@@ -130,6 +148,11 @@ def test_diff_shows_a_quantity_in_one_unit(home: Path) -> None:
     assert rows["returned.gain.share"][-3:] == rows["returned.outcome.way [m]"][-3:] == ["0.2", "0.25", "+0.05"]
     metrics = json.loads(done("diff", "slow", "fast", "--json", folder=home).out)["metrics"]
     assert metrics["returned.value"] == [0.2, 0.25]
+    assert {"[cm/s]", "20", "25"} <= {*done("runs", "sort=returned.value", folder=home).out.split()}
+    for name in ("returned.value", "returned.value [cm/s]"):
+        assert listed(f"metric={name}>22", folder=home) == listed(f"sort=-{name}", "limit=1", folder=home) == ["fast"]
+    table = done("show", "slow", folder=home).out
+    assert "returned.value [cm/s]" in table and "[20, none]" in table
 
 
 def test_clean_removes_what_it_has_named_when_it_is_asked_to(home: Path) -> None:
@@ -157,6 +180,7 @@ def test_clean_leaves_work_that_a_process_is_at(home: Path) -> None:
 
 def test_clean_goes_to_stale_and_orphaned_artifacts_when_asked_and_leaves_foreign_files(home: Path) -> None:
     make("walk1/evaluate", "evaluate", {"best": 0.1}, above="walk1/optimize")
+    make("grandchild", "evaluate", {"best": 0.1}, above="walk1/evaluate")
     make("walk0/optimize", "optimize", {"best": 0.4}, force=True)
     (home / "runs/walk0/evaluate/mine.txt").write_text("notes")
     (home / "outside").mkdir()
@@ -167,6 +191,7 @@ def test_clean_goes_to_stale_and_orphaned_artifacts_when_asked_and_leaves_foreig
     (home / "runs/walk1/optimize").rmdir()
     assert "stale: runs/walk0/optimize was built anew" in done("clean", "stale=true", folder=home).out
     assert "orphaned: runs/walk1/optimize is gone" in done("clean", "orphaned=true", folder=home).out
+    assert "grandchild" in done("clean", "orphaned=true", folder=home).out
     done("clean", "stale=true", "orphaned=true", "--yes", folder=home)
     assert (home / "outside/keep").is_file() and not (home / "runs/.link.partial").is_symlink()
     assert [path.name for path in (home / "runs/walk0/evaluate").iterdir()] == ["mine.txt"]
@@ -175,11 +200,13 @@ def test_clean_goes_to_stale_and_orphaned_artifacts_when_asked_and_leaves_foreig
 
 def test_a_wrong_word_of_clean_is_one_line(home: Path) -> None:
     assert "there is name, orphaned, stale" in refused("clean", "all=true", folder=home)
-    assert gsl("clean", "stale=perhaps", folder=home).code == 2
+    assert "must be true or false" in refused("clean", "stale=yes", folder=home)
 
 
+@pytest.mark.parametrize("kind", ["iterate", "compare"])
 @pytest.mark.parametrize("command", ["show", "lineage"])
-def test_the_name_of_a_whole_run_means_its_iterate(home: Path, command: str) -> None:
-    make("whole/iteration_01/optimize", "optimize", {"best": 0.2})
-    make("whole/iterate", "iterate", {"best": 0.2})
-    assert "whole/iterate" in "".join(done(command, "whole", folder=home)[1:])
+def test_the_name_of_a_whole_run_means_its_main_artifact(home: Path, command: str, kind: str) -> None:
+    for number in (1, 2):
+        make(f"whole/trial_{number}/optimize", "optimize", {"best": 0.2})
+    make(f"whole/{kind}", kind, {"best": 0.2})
+    assert f"whole/{kind}" in "".join(done(command, "whole", folder=home)[1:])

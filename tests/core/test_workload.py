@@ -168,6 +168,10 @@ def test_a_phase_has_its_own_clock_until_a_loop_or_a_part_says_more() -> None:
             with load.loop(2, "replaying"):
                 assert load.text() == "0 % done; fold 1 of 2 (gain 8), replaying: 0 of 2"
             load.finish()
+        load.enter("loading joints")
+        with load.loop(2, "optimising"):
+            clock.now += 1.0
+        assert load.text() == "diagnose, 6 s", "what was done before the loop is over"
     assert load.text() == ""
 
 

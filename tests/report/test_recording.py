@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from commands import done, refused
 
 from gsl.commandline.view import replay_in_the_air
+from gsl.errors import InputError
+from gsl.report.recording import record_shots
 from gsl.robots.catalogue import robot
+from gsl.robots.nao import nao
 from gsl.storage.trajectories import read
 
 pytestmark = pytest.mark.slow
@@ -43,6 +48,19 @@ def test_a_recording_holds_robot_ghost_and_curves(home: Path) -> None:
     joints = read(home / "runs/air/collect_real/trajectories.parquet").joints
     assert written.count(b"TimeSeries") >= len(joints)  # the viewer's own layout has no plot
     assert all(written.count(f"joints/{joint}/ghost".encode()) for joint in joints)
+
+
+def test_a_viewer_that_does_not_start_is_told_after_the_way_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Stream:
+        def __init__(self, name: str) -> None:
+            """Take any name."""
+
+        def spawn(self) -> None:
+            raise RuntimeError("no executable " + "in the path " * 60)
+
+    monkeypatch.setitem(sys.modules, "rerun", SimpleNamespace(RecordingStream=Stream))
+    with pytest.raises(InputError, match=r"^write a file with out=motion\.rrd; .* no executable .{1,200}$"):
+        record_shots(nao(), [], [], None)
 
 
 def test_a_wrong_word_or_a_missing_viewer_is_one_line(home: Path) -> None:

@@ -137,6 +137,19 @@ def test_a_log_in_which_the_base_is_held_shows_no_way(walk, tmp_path: Path) -> N
     assert columns.mean() == pytest.approx(WIDTH / 4, abs=WIDTH / 20), "in the middle"
 
 
+def test_a_walk_and_a_log_in_the_air_are_both_seen_whole(walk, tmp_path: Path) -> None:
+    still = {name: np.full_like(values, values[0]) for name, values in walk.sensors.items()}
+    held = replace(walk, sensors=still, action=walk.action + 0.1)
+    image = sheet([Shot("a", "", walk, RED), Shot("b", "", held, GREEN)], tmp_path / "both.png")
+    first = image[: len(image) // SHEET]
+    walking, hanging = (np.flatnonzero(orange(half).any(axis=1)) for half in np.split(first, 2, axis=1))
+    assert np.ptp(hanging) == pytest.approx(np.ptp(walking), rel=0.1)
+    assert 0.1 * len(first) < hanging[0] < walking[0]
+    pictures = [draw_traces(nao().controlled, [Shot("a", "", walk, RED), Shot("b", "", other, GREEN)], 800)[0]
+                for other in (replace(held, action=walk.action), held)]  # fmt: skip
+    assert not np.array_equal(*pictures), "the second command is drawn where it is another"
+
+
 def test_a_film_has_a_format(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"\.gif or \.mp4"):
         check_format(tmp_path / "walk.avi")
@@ -182,6 +195,7 @@ def test_render_shows_a_policy_on_both_sides(toy: Path, tmp_path: Path, capsys: 
         (["slow=0"], "slow"),
         (["slow=fast"], "must be a number"),
         (["slow"], "name=value"),
+        (["beside=first"], "beside: is for a log, and this is evaluate"),
     ],
 )
 def test_render_refuses_in_one_line(
