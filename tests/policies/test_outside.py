@@ -360,7 +360,7 @@ def test_a_brought_policy_is_collected_with_searched_and_evaluated(network: Any,
     said = done(
         "evaluate", *base, "policies=null", "episodes=2", "check=2", "confirmation=2", "out=alone", folder=tmp_path
     )
-    assert "pi0, fresh" in said.out
+    assert "π0, fresh" in said.out
 
 
 def test_the_wiring_is_shown_and_a_wrong_one_exits_with_2(network: Any, tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_show_tells_where_an_artifact_comes_from_and_what_it_holds(chain: Path) 
         f"runs/chain/optimize   {parent['hash'][:12]}   the same",
         "policies in the real world",
         "on the real side [cm/s]",
-        "pi0, fresh",
+        "π0, fresh",
         f"{metrics['real_episodes']} real episodes",
         "evaluation.json",
         "all files are as they were made",
