@@ -90,7 +90,11 @@ class Rounds:
 
     @property
     def verdict(self) -> str:
-        """The result in a sentence or two, with what it cost."""
+        """The result in a sentence or two, with what it cost, and beside the search without grounding."""
+        return f"{self._figures}{self._without_gain}"
+
+    @property
+    def _figures(self) -> str:
         air = self._flight.episodes if self._flight else 0
         flown = f" and {air} motions in the air" if air else ""
         cost = f"{self._spent - air} real episodes{flown} were spent."
@@ -107,7 +111,7 @@ class Rounds:
         fell = f"{after['falls']} falls in " if unit.falls else ""
         end = f"{fell}{after['episodes']} fresh episodes. {self._end}{cost}"
         values = f"π0 {unit.bare(before['value'])}, returned{of} {unit.format(after['value'])}"
-        return f"On the real side: {values}, {last}, {end}{self._without_gain}"
+        return f"On the real side: {values}, {last}, {end}"
 
     @property
     def _end(self) -> str:
@@ -188,24 +192,24 @@ class Rounds:
         if self.best is None:
             reached = f"{unit.format(after['value'])} (95 % {unit.interval(after['interval'])})"
             sentence = f"No policy better than π0 was found. π0 is returned; it reaches {reached} on the real side."
-            return Answer(question, sentence, sure=False, more=[self.verdict, *self._without])
+            return Answer(question, sentence, sure=False, more=[self._figures, *self._without])
         over = "π0" if figures["returned_iteration"] == 1 else "the iteration before"
         sentence, sure = describe_gain("The returned policy", after, before, gain, unit, over)
-        more, nothing = [self.verdict, *self._without], self._without_gain
-        return Answer(question, f"{sentence}{nothing}", sure and not nothing, more)
+        ahead = self._beside is None or after["value"] > self._beside.metrics["returned"]["value"]
+        return Answer(question, f"{sentence}{self._without_gain}", sure and ahead, [self._figures, *self._without])
 
     @property
     def _without_gain(self) -> str:
-        """That the returned policy is not surely better than that of the search without grounding, if that is so."""
+        """That the policy is not better than that of the search without grounding, or not surely, if that is so."""
         if self._beside is None or self.best is None:
             return ""
         with_it, without = self.best.metrics["returned"], self._beside.metrics["returned"]
         margins = [summary["value"] - summary["interval"][0] for summary in (with_it, without)]
         if with_it["value"] - without["value"] > math.hypot(*margins):  # both were measured independently
             return ""
-        unit, doubt = self._unit, "significantly " * (with_it["value"] > without["value"])
-        reached = unit.format(without["value"])
-        return f" The policy is not {doubt}better than that of the search without grounding, {reached}."
+        ahead = with_it["value"] > without["value"]
+        says = "One run does not show that the policy is" if ahead else "The policy is not"
+        return f" {says} better than that of the search without grounding, {self._unit.format(without['value'])}."
 
     @property
     def _without(self) -> list[str]:
