@@ -336,7 +336,7 @@ def test_a_function_that_returns_nonsense_is_refused_by_the_audit_and_by_an_epis
 def test_a_network_that_makes_choices_is_evaluated_and_cannot_be_searched(tmp_path: Path) -> None:
     (tmp_path / "choosing.py").write_text("def act(seen):\n    return [0.0]\n")
     base = ("world=cliff_walking", "policy=python", "policy.function=choosing:act", "task=own_reward")
-    few = ("policies=null", "episodes=2", "check=2", "confirmation=2")
+    few = ("policies=null", "episodes=2", "check=2", "confirmation=2", "workers=1")
     assert "π0 alone was measured" in done("evaluate", *base, *few, folder=tmp_path).out
     said = refused("optimize", *base, "grounding=none", folder=tmp_path)
     assert said.startswith("policy = FunctionPolicy: has no parameters")
