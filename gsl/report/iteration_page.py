@@ -19,7 +19,7 @@ from gsl.report.parts import Part, bullets, element, prose, section, table
 from gsl.report.run_page import Change, budget, curves, footfalls, joints, parameters, write_page
 from gsl.report.svg import WIDTH, svg
 
-_PLAYED = " Policies walked once more for it; figures are of other walks."
+_PLAYED = " Policies walked once more for this picture; the figures are of other walks."
 _GROUPS = {"pi0": "of π0", "off_pi0": "off π0"}
 
 
