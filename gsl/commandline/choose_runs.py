@@ -72,7 +72,7 @@ class Run:
         return unit_of(self.artifact)
 
     @cached_property
-    def shown(self) -> dict[str, float]:
+    def figures(self) -> dict[str, float]:
         """Its metrics as people are shown them: values of its task in the task's unit."""
         return dict(zip(self.metrics, show_in_unit(self.metrics, self.unit).values(), strict=True))
 
@@ -113,12 +113,12 @@ def choose(artifacts: Sequence[Artifact], choice: Choice, now: datetime) -> tupl
     ]
     if asked:
         asked = _find_metric("metric", asked, runs)
-        runs = [run for run in runs if asked in run.shown and condition(run.shown[asked])]
+        runs = [run for run in runs if asked in run.figures and condition(run.figures[asked])]
     key = choice.sort.removeprefix("-") or "made"
     if key not in _ORDERS:
         key = _find_metric("sort", key, runs, more=tuple(_ORDERS))
         runs = [run for run in runs if key in run.metrics]
-    order = _ORDERS.get(key, lambda run: run.shown[key])
+    order = _ORDERS.get(key, lambda run: run.figures[key])
     runs = sorted(runs, key=order, reverse=choice.sort.startswith("-"))
     if choice.limit:
         runs = runs[: choice.limit] if choice.sort else runs[-choice.limit :]

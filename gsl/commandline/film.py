@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
-
 from gsl.commandline.own_word import find_own_modules, find_trust
 from gsl.commandline.rebuild import rebuild, rebuild_search
 from gsl.commandline.words import split_words
@@ -28,7 +26,7 @@ from gsl.report.film import Shot, check_format, film
 from gsl.report.style import GROUNDED, SIMULATION
 from gsl.report.style import REAL as REAL_COLOUR
 from gsl.robots.catalogue import robot as robot_of
-from gsl.rollout.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario, play_once
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policies import PolicyRecord
@@ -177,7 +175,7 @@ def _walk(folder: Path, kind: str, settings: Subject, trust: Sequence[str], cons
     parameters, seed = vector(stage.policy, policy), derive_seed(settings.seed, "film")
     shots = tuple(
         Shot(
-            policy.name, where, _roll_out(scenario, parameters, seed), colour, _describe(world, stage.policy, settings)
+            policy.name, where, play_once(scenario, parameters, seed), colour, _describe(world, stage.policy, settings)
         )
         for where, scenario, colour, world in sides
     )
@@ -207,11 +205,3 @@ def _robot_in(world: Any) -> Robot:
     if not isinstance(inner, BulletWorld):
         raise InputError("a film shows robots; this world is an environment without one")
     return inner.plant.robot
-
-
-def _roll_out(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
-    env = scenario.make()
-    try:
-        return rollout(scenario, env, parameters, seed)
-    finally:
-        env.close()

@@ -69,7 +69,7 @@ def _value(run: Run, metric: str | None, title: str | None) -> list[str]:
     """Return the cell of a metric, with its unit where not all rows have the same one."""
     if not metric:
         return []
-    value, unit = plain(run.shown[metric]), run.unit.name
+    value, unit = plain(run.figures[metric]), run.unit.name
     return [value if title_in_unit(metric, run.unit) == title else f"{value} {unit}"]
 
 

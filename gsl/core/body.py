@@ -171,7 +171,7 @@ class Robot:
             names |= set(self._members(word))
         return np.array([motor in names for motor in self.motors])
 
-    def list_controlled(self, joints: str | Sequence[str]) -> list[str]:
+    def list_joints(self, joints: str | Sequence[str]) -> list[str]:
         """Return the controlled joints that a scope names, see `mask`."""
         return [name for name, acts in zip(self.controlled, self.mask(joints), strict=False) if acts]
 

@@ -74,7 +74,7 @@ def _entries(name: str, entries: Any, robot: Robot, ratio: Mapping[str, float]) 
     for entry in entries if isinstance(entries, list | tuple) else [entries]:
         settings = settings_of(effect_class(name))
         powers = {key: exponent for key in entry if key in settings and (exponent := power(settings[key].unit))}
-        joints = robot.list_controlled(entry.get("joints", "all")) if "joints" in settings and powers else []
+        joints = robot.list_joints(entry.get("joints", "all")) if "joints" in settings and powers else []
         shares = sorted({ratio[joint] for joint in joints}, reverse=True)
         if shares in ([], [1.0]):
             result.append(entry)

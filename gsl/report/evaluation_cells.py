@@ -10,6 +10,8 @@ import numpy as np
 from gsl.core.unit import Unit
 from gsl.core.words import in_unit
 
+BEGUN = {"pi0": "π0", "start": "where it began"}  # names in files of what a search begins with
+
 
 def outcomes_beside(rows: Sequence[Mapping[str, Any]], unit: Unit) -> list[str]:
     """Return the outcomes that rows have, but for one that is their value under another name."""
@@ -28,8 +30,8 @@ def columns(outcomes: Sequence[str], unit: Unit) -> list[str]:
 
 
 def name_policy(name: str) -> str:
-    """Return what people call a policy: the start is π0, whatever its name in files."""
-    return "π0" if name == "pi0" else name
+    """Return what people call a policy, whatever its name in files."""
+    return BEGUN.get(name, name)
 
 
 def ends(unit: Unit) -> str:

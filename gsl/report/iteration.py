@@ -11,7 +11,7 @@ from typing import Any
 from gsl.core.interfaces import Task
 from gsl.core.unit import Unit, format_gain
 from gsl.core.words import falls
-from gsl.report.evaluation_cells import ends, format_ends
+from gsl.report.evaluation_cells import ends, format_ends, name_policy
 from gsl.report.flight import Flight
 from gsl.report.learning_curve import Search, learning_curve, search
 from gsl.report.markdown import table
@@ -20,7 +20,6 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.policy_choice import EVALUATION
 
 CURVE, MARKDOWN = "learning_curve.png", "table.md"
-BEGUN = {"pi0": "π0", "start": "where it began"}  # what a search without a better policy returns
 
 
 class Rounds:
@@ -250,7 +249,7 @@ class Rounds:
         improvement = f"{format_gain(gain['share']) or self._unit.format(gain['value'], sign=True)} over {over}"
         zero: tuple[str, ...] = ("0", "π0", "", *self._format_measured(metrics["baseline"]), "", "")
         rows = [zero] if first else []
-        name = BEGUN.get(metrics["best"], metrics["best"])
+        name = name_policy(metrics["best"])
         rows.append((label, name, expected, *self._format_measured(metrics["returned"]), improvement, cost))
         self.rows += rows
         return rows

@@ -12,7 +12,7 @@ from markupsafe import Markup
 from gsl.core.unit import Unit
 from gsl.core.words import falls, in_unit, several
 from gsl.report.charts import Curve, line_chart
-from gsl.report.iteration import BEGUN
+from gsl.report.evaluation_cells import name_policy
 from gsl.report.iteration_page import grounding
 from gsl.report.parts import section, table
 from gsl.report.run_page import Answer, Change, budget, parameters, write_page
@@ -68,12 +68,12 @@ def write_search_page(
         spent: What the search cost in simulation.
     """
     begun = ((check or {}).get("pi0") or {}).get("value")  # the check of a model of states tells none
-    beside = "" if begun is None else f", {BEGUN[tried[0]]} {unit.bare(begun)}"
+    beside = "" if begun is None else f", {name_policy(tried[0])} {unit.bare(begun)}"
     generations = several(len(winners), "generation")
     sentence = f"{best.name}, the best of {generations}, reaches {unit.format(best.value_sim)} in simulation{beside}."
     more = ["The best of many had luck as well: only `gsl evaluate` says what it is worth on the real side."]
     if drift := metrics.get("drift"):
-        first, *_, last = ((BEGUN.get(name, name), f"{100.0 * share:.0f} %") for name, share in drift.items())
+        first, *_, last = ((name_policy(name), f"{100.0 * share:.0f} %") for name, share in drift.items())
         spends = f"{last[0]} spends {last[1]} of its time where the grounding has seen nothing"
         more.append(f"{spends}, {first[0]} {first[1]}.")
     failed = (check or {}).get("problems") or []

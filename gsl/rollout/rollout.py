@@ -89,6 +89,15 @@ def rollout(scenario: Scenario, env: gymnasium.Env, parameters: np.ndarray, seed
     return trajectory if np.array_equal(grounded, actions) else replace(trajectory, grounded_action=grounded)
 
 
+def play_once(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
+    """Run one episode in an environment of its own; arguments as those of `rollout`."""
+    env = scenario.make()
+    try:
+        return rollout(scenario, env, parameters, seed)
+    finally:
+        env.close()
+
+
 def start_policy(policy: Policy, parameters: np.ndarray, layout: Layout) -> PolicyRun:
     """Return a policy at the beginning of an episode.
 

@@ -135,13 +135,13 @@ class CrossValidate:
         with console.plan("fold", [Part()] * len(groups)):
             folds = [self._fold(log, *pair, console) for pair in zip(groups, after, strict=True)]
         documents.write_json(folder / DATA, [fold.document() for fold in folds])
-        (folder / TABLE).write_text(table(folds, self.by, self._unit(log)[1]), encoding="utf-8")
+        (folder / TABLE).write_text(table(folds, self.by, self._unit(log)), encoding="utf-8")
         means = {way: float(np.mean(np.concatenate([fold.replayed[way] for fold in folds]))) for way in folds[0].errors}
         return {"folds": len(folds), "mean_error": means, "causes": {fold.held_out: fold.causes for fold in folds}}
 
-    def _unit(self, log: Batch) -> tuple[float, str]:
-        """Return what takes an error of all joints from angles to what a reader is told, and its unit."""
-        return say(with_log_in_angles(log, self.sim.plant)[1].robot, log.joints, "rad")
+    def _unit(self, log: Batch) -> str:
+        """Return the unit in which a reader is told an error of all joints."""
+        return say(with_log_in_angles(log, self.sim.plant)[1].robot, log.joints, "rad")[1]
 
     def _groups(self, log: Batch) -> list[list[Any]]:
         """Return what is held out together: each value alone, or every so many'th of them in order."""

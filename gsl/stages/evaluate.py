@@ -24,8 +24,8 @@ from gsl.grounding.none import NoGrounding
 from gsl.policies.outside import warn_of_wiring
 from gsl.policies.policy import size
 from gsl.real_robot.errand import Errand, Order, answer_parents, ask
+from gsl.report.evaluation_cells import name_policy
 from gsl.report.evaluation_page import Look, write_evaluation_page
-from gsl.report.iteration import BEGUN
 from gsl.report.run_page import Change
 from gsl.rollout.parallel import Episode, Job, Workers, episodes
 from gsl.rollout.promise import promise
@@ -144,7 +144,7 @@ class Evaluate:
             shown = next((n for n, episode in enumerate(done) if episode.fell), 0)
             seed = derive_seed(self.seed, self.kind, _REPORT, theta.name, shown)
             played = Walked(vector(self.policy, theta), seed, logs.get(theta.name))
-            walks[BEGUN.get(theta.name, theta.name)] = played
+            walks[name_policy(theta.name)] = played
         source = resolve(self.policies) if self.policies else None
         return look_at(self._scenario, walks, source, modules_in(describe(self)), console)
 
@@ -200,7 +200,7 @@ class Evaluate:
     ) -> list[list[Episode]]:
         """Return the episodes of some policies; but for a report, none after a fall that is not tolerated.
 
-        Into `logs` goes what a robot that is elsewhere has logged of each policy.
+        Into `logs` goes what a robot that is elsewhere has logged of each policy for the report.
         """
         scenario = self._scenario
         jobs = [
@@ -219,7 +219,7 @@ class Evaluate:
             done = [None if verdict is None else verdict.episode for verdict in verdicts]
             pairs = [(order.policy, verdict) for order, verdict in zip(orders, verdicts, strict=True) if verdict]
             for name, verdict in sorted(pairs, key=lambda pair: not pair[1].episode.fell)[::-1]:  # the first fall last
-                if verdict.trajectory:
+                if verdict.trajectory and purpose == _REPORT:
                     logs[name] = verdict.trajectory
         else:
             with console.progress(len(jobs), f"{purpose} in the real world") as progress:

@@ -20,12 +20,12 @@ from gsl.report.evaluation_page import Look
 from gsl.report.flight import describe_servo
 from gsl.report.joint_trace import Traces
 from gsl.report.shown import scale_of
-from gsl.rollout.rollout import Scenario
+from gsl.rollout.rollout import Scenario, play_once
 from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.policy_choice import find_search
 from gsl.validation.gate import REPORT
-from gsl.validation.iteration_pictures import Way, centre, read_footfalls, show_window, trace_joints, walk_once
+from gsl.validation.iteration_pictures import Way, centre, read_footfalls, show_window, trace_joints
 from gsl.validation.replay import PAST
 from gsl.worlds.external import ExternalRobot
 
@@ -68,7 +68,7 @@ def look_at(
     findings = list(_describe_servos(searched)) if searched else []
     if simulated := centre(real.world):
         robot = simulated.plant.robot
-        episodes = {name: walk_once(real, walk.parameters, walk.seed) for name, walk in walks.items()}
+        episodes = {name: play_once(real, walk.parameters, walk.seed) for name, walk in walks.items()}
     elif isinstance(real.world, ExternalRobot):
         robot, episodes = real.world.body, {name: walk.log for name, walk in walks.items() if walk.log}
     else:
@@ -84,7 +84,7 @@ def look_at(
                 ways.append(Way(inner, grounded.grounding))
             name, walk = next(iter(walks.items()))
             where = "in the grounded simulator" if len(ways) > 1 else "in simulation"
-            steps.append(read_footfalls(f"{name} {where}", walk_once(grounded, walk.parameters, walk.seed)))
+            steps.append(read_footfalls(f"{name} {where}", play_once(grounded, walk.parameters, walk.seed)))
     except GslError as error:  # it is of another rate, or its settings name code that nobody has trusted here
         console.status(f"{_ALONE}: {error}")
         ways = []

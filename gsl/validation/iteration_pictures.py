@@ -25,7 +25,7 @@ from gsl.report.iteration_page import Seen
 from gsl.report.joint_trace import Traces, joint_trace
 from gsl.report.shown import scale_of
 from gsl.report.style import GROUNDED, REAL
-from gsl.rollout.rollout import Scenario, rollout
+from gsl.rollout.rollout import Scenario, play_once
 from gsl.validation.replay import PAST, Place, replay
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
@@ -110,7 +110,7 @@ def draw_flight(
     shown = _largest_held_out(log, held)
     if not missing(shown, held.layout):
         traces = _draw_joint(folder, Way(held, NoGrounding()), Way(steady, NoGrounding()), shown)
-    walk = walk_once(scenario, parameters, derive_seed(seed, WALK))
+    walk = play_once(scenario, parameters, derive_seed(seed, WALK))
     if not missing(walk, grounded.layout):
         shot = Shot("returned policy", "in the grounded simulator", walk, GROUNDED)
         _draw_walk(robot, shot, scenario.policy, folder)
@@ -124,20 +124,11 @@ def show_steps(
     """Return the footfalls of π0 and of the policy that is returned, on the real side if that is simulated, in both."""
     sides = {"on the real side": real} if centre(real.world) else {}
     walks = [
-        read_footfalls(f"{name} {where}", walk_once(scenario, parameters, derive_seed(seed, WALK)))
+        read_footfalls(f"{name} {where}", play_once(scenario, parameters, derive_seed(seed, WALK)))
         for where, scenario in {**sides, place: simulated}.items()
         for name, parameters in (("π0", simulated.policy.initial), ("the returned policy", returned))
     ]
     return [walk for walk in walks if walk]
-
-
-def walk_once(scenario: Scenario, parameters: np.ndarray, seed: int) -> Trajectory:
-    """Return one episode of a policy."""
-    env = scenario.make()
-    try:
-        return rollout(scenario, env, parameters, seed)
-    finally:
-        env.close()
 
 
 def _draw_walk(robot: Robot, shot: Shot, policy: Policy, folder: Path) -> None:

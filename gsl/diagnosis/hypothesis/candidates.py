@@ -97,7 +97,7 @@ class Candidate:
 
     def joints(self, robot: Robot) -> list[str]:
         """Return the controlled joints where it acts, none if that is elsewhere."""
-        return robot.list_controlled(self.fixed["joints"]) if self.on_joints else []
+        return robot.list_joints(self.fixed["joints"]) if self.on_joints else []
 
     def say(self, robot: Robot) -> list[tuple[float, str]]:
         """Return what takes each free parameter to what a reader is told, and its unit, see `angles.say`."""

@@ -208,7 +208,7 @@ class _Reading(NamedTuple):
         """Return the signal and the number of rows that were left out."""
         raw = side_by_side(self.name, self.references, values, joints, self.table)[self.rows]
         stamps = seconds(self.table.path, self._stamps(values), self.mapping.time, self._column())
-        keep = self._find_filled(raw, joints)
+        keep = self._find_rows(raw, joints)
         stamps, raw, rows = stamps[keep], raw[keep], self.rows[keep]
         drop = self.mapping.duplicates == "drop"
         keep = order_rows(self.table.path, stamps, self._column(), rows, drop=drop, unit=self.mapping.time.unit)
@@ -244,7 +244,7 @@ class _Reading(NamedTuple):
             return self.mapping.time.period * np.arange(len(self.rows))
         return values[self._column()][self.rows]
 
-    def _find_filled(self, raw: np.ndarray, joints: Sequence[str]) -> np.ndarray:
+    def _find_rows(self, raw: np.ndarray, joints: Sequence[str]) -> np.ndarray:
         """Return which rows have values; empty cells are refused unless they mean that nothing is new."""
         wrong = ~np.isfinite(raw)
         empty = wrong.any(axis=1)
