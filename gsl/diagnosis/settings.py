@@ -23,6 +23,11 @@ class FloorSettings:
     usual: float = 0.75  # share of the resting windows, the calmest, that is looked at: a push is no shaking
     rests: int = 2  # resting windows that it takes to judge
     still: float = 1e-6  # a command that moves less rests [rad]: rounding in a file
+    spectrum: int = 64  # ticks of the windows whose spectrum shows white noise
+    skipped: int = 3  # lowest frequencies of it, where the motion is
+    quietest: float = 0.2  # share of the windows and frequencies that noise alone fills
+    smooth: float = 0.25  # share of white noise's power below which a command's own roughness does not count
+    unwhite: float = 1.5  # times white noise that is none. Measured: at most 1.1 on calm joints, 1.5 to 9 on shaking ones
     unmeasured: float = 3.0  # encoder steps that are the floor where every joint shakes
 
 

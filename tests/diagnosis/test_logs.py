@@ -6,10 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from gsl.core.body import lump
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.files import check_log, log_files, on_ground, read_logs
+from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.log.residual import roughness
 from gsl.errors import GslError
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import write
@@ -113,3 +116,21 @@ def test_a_log_whose_targets_rest_is_no_log_without_commands_where_there_are_oth
         return replace(constant(episode), sensors={"torque_command.LKneePitch": np.sin(0.1 * np.arange(101))})
 
     check_log(changed(log(), by_torque), NAO, "log")
+
+
+def test_joints_that_shake_under_steps_do_not_pass_for_noise() -> None:
+    """Nothing is repeated and no command rests for long: white noise alone is the floor of a joint that shakes."""
+    rng, noise, time = np.random.default_rng(3), 1.5e-3, 0.02 * np.arange(601)
+    steps = np.repeat(rng.uniform(-0.1, 0.1, (30, 3)), 20, axis=0)
+    fast = 0.1 * np.sin(2 * np.pi * 5.0 * time[:-1])  # commanded, so no shaking
+    commands = REST + np.zeros((600, len(REST)))
+    commands[:, :3] += steps
+    commands[:, 3] += fast
+    still = lfilter([0.0, 0.09], [1.0, -1.4, 0.49], np.vstack([commands[:1], commands]) - REST, axis=0) + REST
+    position = still + noise * rng.standard_normal(still.shape)
+    position[:, 0] += 0.012 * np.sin(2 * np.pi * 13.0 * time)
+    batch = Batch((Trajectory(time, commands, position, np.zeros_like(position)),), NAO.controlled, 0.02, {})
+    cut = cut_log(batch, NAO)
+    assert list(np.flatnonzero(cut.noise.restless)) == list(np.flatnonzero(cut.comparison.shaking)) == [0]
+    assert 0.7 * noise < cut.noise.sd[0] < 2.0 * noise < 0.6 * roughness(cut.records)[0]
+    assert cut.noise.sd[1:3] == pytest.approx(roughness(cut.records)[1:3])

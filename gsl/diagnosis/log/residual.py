@@ -44,6 +44,7 @@ class NoiseFloor:
         pairs: Repeats that were compared.
         resolution: Of the encoders [rad].
         samples: Independent numbers that it comes from, over all joints.
+        restless: Joints that are rough while their commands are smooth, and not as white noise is, (n_joints,).
     """
 
     sd: np.ndarray
@@ -53,6 +54,7 @@ class NoiseFloor:
     pairs: int
     resolution: float
     samples: int
+    restless: np.ndarray
 
     @property
     def slack(self) -> float:
@@ -84,6 +86,8 @@ def noise_floor(
     how = settings or FloorSettings()
     least = np.array(max(resolution / np.sqrt(12.0), 1e-5)) if least is None else least
     groups = [group for group in _group(records, repeats, held, how) if len(group) > 1]
+    white = white_level(records, how)
+    restless = _find_restless(records, white, np.maximum(how.unwhite * white, resolution), how)
     if groups:
         spread = [align_repeats(group, period)[:, how.settled :] for group in groups]
         square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
@@ -92,10 +96,12 @@ def noise_floor(
         sd = np.maximum(np.sqrt(square), least)
         usual = np.inf if least.ndim else float(np.median(sd))
         unsteady = sd > how.unsteady * usual
-        return NoiseFloor(np.where(unsteady, usual, sd), np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples)
-    sd = np.maximum(roughness(records, how.quiet), least)
+        sd = np.where(unsteady, usual, sd)
+        return NoiseFloor(sd, np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples, restless)
+    rough = roughness(records, how.quiet)
+    sd = np.maximum(np.where(restless, np.minimum(rough, white), rough), least)
     calm = np.zeros(len(sd), dtype=bool)
-    return NoiseFloor(sd, np.zeros(len(sd)), calm, "estimated", 0, resolution, how.estimate)
+    return NoiseFloor(sd, np.zeros(len(sd)), calm, "estimated", 0, resolution, how.estimate, restless)
 
 
 def _variance(spread: Sequence[np.ndarray]) -> np.ndarray:
@@ -139,6 +145,46 @@ def roughness(records: Sequence[Record], quiet: float = FloorSettings.quiet) -> 
     speed = np.vstack([np.abs(np.gradient(record.measured, axis=0)[2:-1]) for record in records])
     slow = speed <= np.quantile(speed, quiet, axis=0)
     return np.sqrt(np.array([np.mean(column[keep]) for column, keep in zip(rough.T, slow.T, strict=True)]))
+
+
+def white_level(records: Sequence[Record], settings: FloorSettings) -> np.ndarray:
+    """Return the size of the white noise under a log's motion [rad], shape (n_joints,); infinite for short records.
+
+    White noise has the same power at all frequencies, so the quietest part of the spectrum shows it: a motion or an
+    oscillation is louder elsewhere. The power of noise in a band is exponential, which says what its quantiles are.
+
+    Args:
+        records: All of the log.
+        settings: How.
+    """
+    length, bands = settings.spectrum, []
+    for record in records:
+        whole = record.measured[: len(record) // length * length]
+        bands.append(_spectrum(whole.reshape(-1, length, whole.shape[1]))[:, settings.skipped :])
+    power = np.concatenate(bands).reshape(-1, records[0].measured.shape[1])
+    if not len(power):
+        return np.full(power.shape[1], np.inf)
+    return np.sqrt(np.quantile(power, settings.quietest, axis=0) / -np.log1p(-settings.quietest))
+
+
+def _find_restless(
+    records: Sequence[Record], white: np.ndarray, most: np.ndarray, how: FloorSettings
+) -> np.ndarray:
+    """Return which joints are rougher than `most` where commands have been smooth for a while, shape (n_channels,)."""
+    rough = np.vstack([third_differences(record.measured)[how.settled :] for record in records])
+    jerk = np.vstack([_jerk_of_commands(record, how.settled) for record in records])
+    restless = np.zeros(len(white), dtype=bool)
+    for joint, still in enumerate(jerk.T[: len(white)] < how.smooth * white[: jerk.shape[1], None] ** 2):
+        if still.sum() > how.settled:
+            restless[joint] = np.mean(rough[still, joint]) > most[joint] ** 2
+    return restless
+
+
+def _jerk_of_commands(record: Record, ticks: int) -> np.ndarray:
+    """Return the largest squared third difference of what a motor was sent in the last ticks, (T - 2 - ticks, n)."""
+    sent = record.commands.reshape(len(record), -1, record.targets.shape[1])
+    jerk = third_differences(np.concatenate([sent[:1], sent]).swapaxes(0, 1)).max(axis=0)
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(jerk, ticks + 1, axis=0).max(axis=-1))
 
 
 @dataclass(frozen=True)
@@ -206,12 +252,17 @@ def _slow_and_fast(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return blocks.mean(axis=2), blocks.var(axis=2).mean(axis=1)
 
 
-def _bands(x: np.ndarray) -> np.ndarray:
-    """Return the mean power but for the mean by band, shape (W, BANDS, n): white noise has its variance in each."""
+def _spectrum(x: np.ndarray) -> np.ndarray:
+    """Return the power of windows by frequency, shape (W, T // 2 + 1, n): white noise has its variance in each."""
     length = x.shape[1]
     taper = np.hanning(length + 2)[1:-1, None]
     taper = taper / np.sqrt((taper**2).mean())
-    spectrum = np.abs(np.fft.rfft((x - x.mean(axis=1, keepdims=True)) * taper, axis=1)) ** 2 / length
+    return np.asarray(np.abs(np.fft.rfft((x - x.mean(axis=1, keepdims=True)) * taper, axis=1)) ** 2 / length)
+
+
+def _bands(x: np.ndarray) -> np.ndarray:
+    """Return the mean power but for the mean by band, shape (W, BANDS, n): white noise has its variance in each."""
+    spectrum = _spectrum(x)
     edges = np.linspace(1, spectrum.shape[1], BANDS + 1).round().astype(int)
     return np.stack([spectrum[:, a:b].mean(axis=1) for a, b in zip(edges[:-1], edges[1:], strict=True)], axis=1)
 
@@ -232,7 +283,8 @@ def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSetti
     resting = moving < settings.still
     real = pieces.real[:, pieces.warm_up :]
     at_rest = [_calmest(real[rests, :, joint], settings.usual) for joint, rests in enumerate(resting.T)]
-    shaking = np.array([_shakes(x, noise.resolution, settings) for x in at_rest])
+    rests = np.array([len(x) >= settings.rests for x in at_rest])
+    shaking = np.where(rests, [_shakes(x, noise.resolution, settings) for x in at_rest], noise.restless[:joints])
     calm = np.median(noise.sd[~shaking]) if not shaking.all() else settings.unmeasured * noise.resolution
     sway = np.array([_sway(x) if shakes else 0.0 for x, shakes in zip(at_rest, shaking, strict=True)])
     sway = np.where(shaking, np.maximum(sway, noise.slow), 0.0)
@@ -248,7 +300,9 @@ def _calmest(rest: np.ndarray, usual: float) -> np.ndarray:
 
 
 def _sway(rest: np.ndarray) -> float:
-    """Return the standard deviation of the means over BLOCK ticks [rad] of what `_calmest` returns."""
+    """Return the standard deviation of the means over BLOCK ticks [rad] of what `_calmest` returns; 0 of nothing."""
+    if not len(rest):
+        return 0.0
     return float(np.sqrt((in_blocks(rest[..., None]).mean(axis=2) ** 2).mean()))
 
 
@@ -257,7 +311,7 @@ def _shakes(rest: np.ndarray, resolution: float, settings: FloorSettings) -> boo
 
     What happens in a few windows only is no shaking.
     """
-    if len(rest) < settings.rests:
+    if not len(rest):
         return False
     power = float((rest**2).mean())
     colour = max(abs(float((rest[:, lag:] * rest[:, :-lag]).mean())) for lag in range(1, settings.lags + 1))
