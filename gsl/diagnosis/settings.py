@@ -27,7 +27,7 @@ class FloorSettings:
     skipped: int = 3  # lowest frequencies of it, where the motion is
     quietest: float = 0.2  # share of the windows and frequencies that noise alone fills
     smooth: float = 0.25  # share of white noise's power below which a command's own roughness does not count
-    unwhite: float = 1.5  # times white noise that is none. Measured: at most 1.1 on calm joints, 1.5 to 9 on shaking ones
+    unwhite: float = 1.5  # times white noise that is none. Measured: up to 1.1 on calm joints, up to 9 on shaking ones
     unmeasured: float = 3.0  # encoder steps that are the floor where every joint shakes
 
 

@@ -26,9 +26,9 @@ import numpy as np
 import scipy
 
 from gsl.core.plant import Plant
+from gsl.diagnosis.log.floor import roughness, third_differences
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Pieces
-from gsl.diagnosis.log.residual import roughness, third_differences
 from gsl.diagnosis.settings import FloorSettings
 from gsl.diagnosis.simulate.calibration import calibrate, no_shifts
 from gsl.diagnosis.simulate.in_the_air import InTheAir, change

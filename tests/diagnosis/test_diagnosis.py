@@ -12,10 +12,10 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.hypothesis.candidates import library
+from gsl.diagnosis.log.floor import NoiseFloor, noise_floor
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import to_records
 from gsl.diagnosis.log.repeats import find_repeats
-from gsl.diagnosis.log.residual import NoiseFloor, noise_floor
 from gsl.diagnosis.search.screening import interpolate
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.verdict.document import document

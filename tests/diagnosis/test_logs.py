@@ -11,8 +11,8 @@ from scipy.signal import lfilter
 from gsl.core.body import lump
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.files import check_log, log_files, on_ground, read_logs
+from gsl.diagnosis.log.floor import roughness
 from gsl.diagnosis.log.log import cut_log
-from gsl.diagnosis.log.residual import roughness
 from gsl.errors import GslError
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import write

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from swinging_arm import NOISE, PERIOD, arm, log
 
+from gsl.diagnosis.log.floor import noise_floor
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import Record, slope
 from gsl.diagnosis.log.repeats import Repeat, find_repeats
-from gsl.diagnosis.log.residual import noise_floor
 
 LAG = 0.06  # by which joints are behind what is commanded [s]
 Path = Callable[[np.ndarray], np.ndarray]

@@ -11,9 +11,10 @@ import numpy as np
 from gsl.core.body import Robot
 from gsl.core.labels import alike
 from gsl.core.trajectory import Batch
+from gsl.diagnosis.log.floor import NoiseFloor, noise_floor
 from gsl.diagnosis.log.records import BASE, Pieces, Record, cut_pieces, to_records
 from gsl.diagnosis.log.repeats import Repeat, find_repeats
-from gsl.diagnosis.log.residual import Comparison, NoiseFloor, compare, noise_floor
+from gsl.diagnosis.log.residual import Comparison, compare
 from gsl.diagnosis.settings import LogSettings
 from gsl.errors import InputError
 

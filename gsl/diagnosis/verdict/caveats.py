@@ -113,7 +113,7 @@ def _joints(findings: Findings) -> Iterator[str]:
     log, how = findings.log, findings.options.verdict
     if log.comparison.shaking.any():
         names = _names(log.channels, log.comparison.shaking)
-        yield f"These joints shake while their commands rest and are judged by the spectrum: {names}."
+        yield f"These joints shake though their commands do not, and are judged by the spectrum: {names}."
     sent = np.array([np.ptp(record.commands, axis=0) for record in log.records]).max(axis=0)
     sent = sent.reshape(-1, log.records[0].targets.shape[1])[:, : len(log.joints)]
     asked = sent[0]

@@ -13,7 +13,7 @@ import numpy as np
 from gsl.core.body import Robot, lump
 from gsl.core.dynamics import gravity_torque
 from gsl.core.plant import Plant
-from gsl.diagnosis.log.residual import BLOCK
+from gsl.diagnosis.log.floor import BLOCK
 from gsl.diagnosis.simulate.calibration import OFFSET, SPREADS, ZERO
 from gsl.diagnosis.simulate.in_the_air import change
 from gsl.diagnosis.verdict.findings import Findings

@@ -1,0 +1,181 @@
+"""The noise floor: how far two logs of the same commands differ, or what a log's own roughness says of that."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gsl.diagnosis.log.records import Record
+from gsl.diagnosis.log.repeats import Repeat, align_repeats
+from gsl.diagnosis.settings import FloorSettings
+
+BLOCK = 5  # ticks of the low pass that joints that shake are seen through: 0.1 s at 50 Hz
+
+
+@dataclass(frozen=True)
+class NoiseFloor:
+    """What noise alone explains.
+
+    Attributes:
+        sd: Standard deviation of a measured position [rad], shape (n_joints,).
+        slow: Of its means over BLOCK ticks, by repeats; 0 without [rad], shape (n_joints,).
+        unsteady: Joints whose repeats differ by much more than those of the others, whose floor they get, (n_joints,).
+        source: `repeats` or `estimated`.
+        pairs: Repeats that were compared.
+        resolution: Of the encoders [rad].
+        samples: Independent numbers that it comes from, over all joints.
+        white: Of white noise alone, from the quietest part of the spectrum [rad], shape (n_joints,).
+        restless: Joints that are rougher than that while their commands are smooth, shape (n_joints,).
+    """
+
+    sd: np.ndarray
+    slow: np.ndarray
+    unsteady: np.ndarray
+    source: str
+    pairs: int
+    resolution: float
+    samples: int
+    white: np.ndarray
+    restless: np.ndarray
+
+    @property
+    def slack(self) -> float:
+        """How much more than expected a residual may cost because the floor is itself measured, relative."""
+        return float(2.0 * np.sqrt(2.0 / max(self.samples, 1)))
+
+
+def noise_floor(
+    records: Sequence[Record],
+    repeats: Sequence[Repeat],
+    period: float,
+    resolution: float,
+    least: np.ndarray | None = None,
+    held: Sequence[int] = (),
+    settings: FloorSettings | None = None,
+) -> NoiseFloor:
+    """Measure the floor.
+
+    Args:
+        records: All of the log.
+        repeats: Which of them are of the same motion, from `find_repeats`.
+        period: Control period [s].
+        resolution: Of the encoders [rad]; the floor is at least what rounding makes, resolution / sqrt(12).
+        least: Least floor of each channel instead, shape (n_channels,).
+        held: Indices of records that are held out by a label; they are no repeats of the others, whose difference from
+            them is to show.
+        settings: How.
+    """
+    how = settings or FloorSettings()
+    least = np.array(max(resolution / np.sqrt(12.0), 1e-5)) if least is None else least
+    groups = [group for group in _group(records, repeats, held, how) if len(group) > 1]
+    white = np.maximum(white_level(records, how), least)
+    restless = _find_restless(records, white, np.maximum(how.unwhite * white, resolution), how)
+    if groups:
+        spread = [align_repeats(group, period)[:, how.settled :] for group in groups]
+        square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
+        pairs = sum(len(group) - 1 for group in groups)
+        samples = sum(part.shape[1] * (len(part) - 1) for part in spread) * len(square)
+        sd = np.maximum(np.sqrt(square), least)
+        usual = np.inf if least.ndim else float(np.median(sd))
+        unsteady = sd > how.unsteady * usual
+        sd = np.where(unsteady, usual, sd)
+        return NoiseFloor(sd, np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples, white, restless)
+    rough = roughness(records, how.quiet)
+    sd = np.maximum(np.where(restless, np.minimum(rough, white), rough), least)
+    calm = np.zeros(len(sd), dtype=bool)
+    return NoiseFloor(sd, np.zeros(len(sd)), calm, "estimated", 0, resolution, how.estimate, white, restless)
+
+
+def _variance(spread: Sequence[np.ndarray]) -> np.ndarray:
+    """Return the variance between repeats, shape (n_joints,), of groups of shapes (repeats, T, n_joints)."""
+    total: np.ndarray = np.sum([part.var(axis=0, ddof=1).sum(axis=0) for part in spread], axis=0)
+    return total / sum(part.shape[1] for part in spread)
+
+
+def in_blocks(x: np.ndarray) -> np.ndarray:
+    """Return what is of shape (n, T, n_joints) in blocks of BLOCK ticks, shape (n, T // BLOCK, BLOCK, n_joints)."""
+    rows = x.shape[1] // BLOCK
+    return x[:, : rows * BLOCK].reshape(len(x), rows, BLOCK, -1)
+
+
+def _group(
+    records: Sequence[Record], repeats: Sequence[Repeat], held: Sequence[int], how: FloorSettings
+) -> list[list[tuple[Record, float]]]:
+    """Return the records of each motion, and by how many rows each is later; those that are held out apart."""
+    groups: dict[tuple[int, bool], list[tuple[Record, float]]] = defaultdict(list)
+    for index, (record, repeat) in enumerate(zip(records, repeats, strict=True)):
+        if len(record) > 2 * how.settled:
+            groups[repeat.motion, index in held].append((record, repeat.later))
+    return list(groups.values())
+
+
+def third_differences(positions: np.ndarray) -> np.ndarray:
+    """Return the squares of third differences along the last but one axis, such that white noise has its variance."""
+    return np.asarray(np.diff(positions, 3, axis=-2) ** 2 / 20.0)
+
+
+def roughness(records: Sequence[Record], quiet: float = FloorSettings.quiet) -> np.ndarray:
+    """Return what encoder noise alone looks like [rad], shape (n_joints,): nothing of it differs between repeats.
+
+    It is the size of third differences where the motion is slow: that of white noise is sqrt(20) times its own.
+
+    Args:
+        records: All of the log.
+        quiet: Share of the ticks that counts as slow.
+    """
+    rough = np.vstack([third_differences(record.measured) for record in records])
+    speed = np.vstack([np.abs(np.gradient(record.measured, axis=0)[2:-1]) for record in records])
+    slow = speed <= np.quantile(speed, quiet, axis=0)
+    return np.sqrt(np.array([np.mean(column[keep]) for column, keep in zip(rough.T, slow.T, strict=True)]))
+
+
+def white_level(records: Sequence[Record], settings: FloorSettings) -> np.ndarray:
+    """Return the size of the white noise under a log's motion [rad], shape (n_joints,); infinite for short records.
+
+    White noise has the same power at all frequencies, so the quietest part of the spectrum shows it: a motion or an
+    oscillation is louder elsewhere. The power of noise in a band is exponential, which says what its quantiles are.
+
+    Args:
+        records: All of the log.
+        settings: How.
+    """
+    length, bands = settings.spectrum, []
+    for record in records:
+        whole = record.measured[: len(record) // length * length]
+        bands.append(spectrum(whole.reshape(-1, length, whole.shape[1]))[:, settings.skipped :])
+    power = np.concatenate(bands).reshape(-1, records[0].measured.shape[1])
+    if not len(power):
+        return np.full(power.shape[1], np.inf)
+    return np.sqrt(np.quantile(power, settings.quietest, axis=0) / -np.log1p(-settings.quietest))
+
+
+def _find_restless(records: Sequence[Record], white: np.ndarray, most: np.ndarray, how: FloorSettings) -> np.ndarray:
+    """Return which joints are rougher than `most` where commands have been smooth for a while, shape (n_channels,)."""
+    restless = np.zeros(len(white), dtype=bool)
+    long = [record for record in records if len(record) > 2 * how.settled]
+    if not long:
+        return restless
+    rough = np.vstack([third_differences(record.measured)[how.settled :] for record in long])
+    jerk = np.vstack([_jerk_of_commands(record, how.settled) for record in long])
+    for joint, still in enumerate(jerk.T[: len(white)] < how.smooth * white[: jerk.shape[1], None] ** 2):
+        if still.sum() > how.settled:
+            restless[joint] = np.mean(rough[still, joint]) > most[joint] ** 2
+    return restless
+
+
+def _jerk_of_commands(record: Record, ticks: int) -> np.ndarray:
+    """Return the largest squared third difference of what a motor was sent in the last ticks, (T - 2 - ticks, n)."""
+    sent = record.commands.reshape(len(record), -1, record.targets.shape[1])[: len(record.position) - 1]
+    jerk = third_differences(np.concatenate([sent[:1], sent]).swapaxes(0, 1)).max(axis=0)
+    return np.asarray(np.lib.stride_tricks.sliding_window_view(jerk, ticks + 1, axis=0).max(axis=-1))
+
+
+def spectrum(x: np.ndarray) -> np.ndarray:
+    """Return the power of windows by frequency, shape (W, T // 2 + 1, n): white noise has its variance in each."""
+    length = x.shape[1]
+    taper = np.hanning(length + 2)[1:-1, None]
+    taper = taper / np.sqrt((taper**2).mean())
+    return np.asarray(np.abs(np.fft.rfft((x - x.mean(axis=1, keepdims=True)) * taper, axis=1)) ** 2 / length)
