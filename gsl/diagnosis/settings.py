@@ -232,6 +232,7 @@ class LocaliseSettings:
     saturated: float = 1.0
     contact: float = 0.08  # after a foot has touched the ground [s]
     samples: int = 400  # of the bootstrap
+    flips: int = 5000  # of signs, in a test of two sides: of one pair in many a chance of 0.001 has to be seen
     above: float = 1.1  # floors: a lower bound has to be above it, for of many cells some are high by chance
     least: int = 3  # samples that have to show a cell, and windows a pair of joints
     alike: float = 0.1  # share of the larger reach by which those of two commands may differ

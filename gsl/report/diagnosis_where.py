@@ -121,7 +121,7 @@ def sides(document: Document) -> Markup | None:
     columns = ("pair", "left", "right", "chance alone", "so")
     note = (
         "Gap / noise of either side, over the moments of the whole log in which both are commanded to move as far, and "
-        "how often chance alone makes them differ so much. A difference is no fault "
+        "how often chance alone makes any pair differ so much. A difference is no fault "
         "yet: the two sides may have moved differently. A fault of one side shows among the causes."
     )
     return section("Left against right", table(columns, rows) if rows else None, note=note)

@@ -6,13 +6,15 @@ import numpy as np
 import pytest
 from swinging_arm import FEW, arm, found, log
 
+from gsl.core.body import lump
 from gsl.core.plant import nominal
-from gsl.core.trajectory import Batch
+from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.verdict.document import document
-from gsl.diagnosis.verdict.localise import Cell, cells, find_regimes
+from gsl.diagnosis.verdict.localise import Cell, cells, find_regimes, sides
 from gsl.errors import GslError
+from gsl.robots.nao import nao
 
 pytestmark = pytest.mark.slow
 
@@ -56,6 +58,21 @@ def test_intervals_of_one_held_out_trajectory_have_a_width() -> None:
     cause = result.verdict.causes[0]
     assert result.selection.chosen.names == ("command_latency",)
     assert cause.low < cause.value < cause.high
+
+
+def test_of_seven_pairs_of_sides_that_are_alike_hardly_any_differs() -> None:
+    robot, rng = lump(nao()), np.random.default_rng(0)
+    position = np.array([0.5 * robot.stance.get(joint, 0.0) for joint in robot.controlled]) + 0.1 * np.sin(
+        0.1 * np.arange(151)[:, None] + np.arange(12)[:, None, None]
+    )
+    episodes = [Trajectory(0.02 * np.arange(151), path[:-1], path, np.zeros_like(path)) for path in position]
+    log = cut_log(Batch(tuple(episodes), robot.controlled, 0.02, {}), robot)
+    shape = (len(log.pieces), log.pieces.scored, len(log.joints))
+    apart = [[pair for pair in sides(log, rng.standard_normal(shape)) if pair["p"] < 0.05] for _ in range(40)]
+    assert len(sides(log, np.ones(shape))) == 7 and np.mean([bool(pairs) for pairs in apart]) < 0.15
+    worse = np.ones(shape)
+    worse[..., log.joints.index("LKneePitch")] = 3.0
+    assert [pair["pair"] for pair in sides(log, worse) if pair["p"] < 0.05] == ["KneePitch"]
 
 
 def test_a_joint_that_is_stuck_is_told_first() -> None:

@@ -168,9 +168,11 @@ def horizon(log: Log, replayed: np.ndarray) -> tuple[list[float], dict[str, list
 def sides(log: Log, z: np.ndarray, settings: LocaliseSettings | None = None) -> list[dict[str, object]]:
     """Return mirrored joints with the rms of each side and the chance that sides that are alike differ as much.
 
+    The chance is Bonferroni's, of all pairs together: of many pairs that are alike, one differs more than most.
     Only windows count in which both are commanded to move as far: else the motions would be compared.
     """
-    how, names, result = settings or LocaliseSettings(), log.joints, []
+    how, names = settings or LocaliseSettings(), log.joints
+    result = list[tuple[str, float, float, float]]()
     reach = np.ptp(log.pieces.windows.commands[..., : len(names)], axis=1)
     for left, right in mirror_pairs(log.robot):
         own = [names.index(name) for name in (left, right)]
@@ -180,12 +182,14 @@ def sides(log: Log, z: np.ndarray, settings: LocaliseSettings | None = None) -> 
         pair = _by_sample(z[alike][..., own] ** 2, log.pieces.take(alike.nonzero()[0]).samples).T
         counts = log.comparison.count_residuals(z.shape[1])[own] * alike.sum()
         difference = pair[0] - pair[1]
-        flips = np.random.default_rng(0).choice([-1.0, 1.0], (how.samples, len(difference)))
+        flips = np.random.default_rng(0).choice([-1.0, 1.0], (how.flips, len(difference)))
         as_far = int((np.abs(flips @ difference) >= abs(difference.sum()) - 1e-9).sum())
-        p = (as_far + 1) / (how.samples + 1)
-        values = [float(np.sqrt(side.sum() / count)) for side, count in zip(pair, counts, strict=True)]
-        result.append({"pair": left[1:], "left": values[0], "right": values[1], "p": p})
-    return result
+        p = (as_far + 1) / (how.flips + 1)
+        rms = np.sqrt(pair.sum(axis=1) / counts)
+        result.append((left[1:], float(rms[0]), float(rms[1]), p))
+    return [
+        {"pair": pair, "left": left, "right": right, "p": min(1.0, p * len(result))} for pair, left, right, p in result
+    ]
 
 
 def mirror_pairs(robot: Robot) -> list[tuple[str, str]]:
