@@ -93,9 +93,17 @@ def label_gap(gap: float, figure: Figure) -> float:
     return gap * CURVES / figure.get_figheight()
 
 
+def lay_out(figure: Figure) -> None:
+    """Give everything its place, once; else each writing begins with a drawing that nobody sees."""
+    if (engine := figure.get_layout_engine()) is not None:
+        engine.execute(figure)
+        figure.set_layout_engine(None)
+
+
 def save(figure: Figure, path: Path) -> Figure:
     """Write a figure as a PNG file without a date in it, and return it: equal figures give equal bytes."""
     with look():
+        lay_out(figure)
         figure.savefig(path, dpi=DPI, metadata={"Software": None})
     return figure
 

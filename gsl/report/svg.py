@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from gsl.report.style import ROLES, look
+from gsl.report.style import ROLES, lay_out, look
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -31,13 +31,14 @@ def svg(figure: Figure, title: str) -> Markup:
     import matplotlib
     from matplotlib.text import Text
 
-    for text in figure.findobj(Text):
-        text.set_path_effects([])  # else its letters are drawn as shapes
     file = io.StringIO()
     settings: Any = {"svg.fonttype": "none", "svg.hashsalt": "gsl", "path.simplify_threshold": 0.2}
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
     with look(), matplotlib.rc_context(settings), warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Glyph .* missing from")  # the reader's own font has it
+        lay_out(figure)
+        for text in figure.findobj(Text):
+            text.set_path_effects([])  # else its letters are drawn as shapes
         figure.savefig(file, format="svg", metadata=nothing)
     whole = file.getvalue()
     (size,) = _HEAD.findall(whole)[:1]
