@@ -155,7 +155,17 @@ def test_bad_input_gets_one_line(air: tuple[Path, Said], changes: tuple[str, ...
 def test_walks_bring_walks_nearer_and_a_further_member_is_as_near(air: tuple[Path, Said]) -> None:
     folder, _ = air
     world = [word.replace("real", "world", 1) for word in SOFT]
-    done("collect", "role=real", *SMALL, *world, "episodes=2", "neighbours=0", "name=walked", folder=folder)
+    done(
+        "collect",
+        "role=real",
+        *SMALL,
+        *world,
+        "task.duration=1.2",
+        "episodes=2",
+        "neighbours=0",
+        "name=walked",
+        folder=folder,
+    )
     done(*TRAIN, "walks=walked/collect_real", "members=2", "name=walked", folder=folder)
     metrics = loaded(folder / "runs/walked/train_servo/metrics.json")
     assert metrics["walks"]["floors_after"] < 0.5 * metrics["walks"]["floors_before"]
