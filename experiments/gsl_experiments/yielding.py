@@ -1,9 +1,9 @@
-"""Compliance transferred, as a study measures it: worlds without a grounding once a trial, the others as they come."""
+"""Compliance transferred, as a study measures it: of a trial's worlds."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from gsl.core.impedance import compute_closure
@@ -38,12 +38,10 @@ class Loads:
     Attributes:
         sim: The plain simulator.
         seed: Of all randomness.
-        bare: Worlds that were measured without a grounding already.
     """
 
     sim: World
     seed: int
-    bare: list[tuple[World, Compliance]] = field(default_factory=list)
 
     def yielding(self, world: World, grounding: Grounding, real: World) -> Yielding:
         """Return what a grounding hands over; nothing where nobody can load the robots.
@@ -55,11 +53,11 @@ class Loads:
         """
         if not all(isinstance(place, BulletWorld) for place in (self.sim, world, real)):
             return Yielding()
-        sim, robot = self._bare(self.sim), self._bare(real)
+        start = derive_seed(self.seed, SECTION)  # as optimize and iterate measure it
+        sim, robot = (measure(place, NoGrounding(), start) for place in (self.sim, real))
         if sim.motors != robot.motors:
             return Yielding()
-        bare = isinstance(grounding, NoGrounding)
-        grounded = self._bare(world) if bare else measure(world, grounding, self._start)
+        grounded = measure(world, grounding, start)
         shares = compute_transfers(sim, grounded, robot)
         return Yielding(
             {group: share.stiffness for group, share in shares.items()},
@@ -67,14 +65,3 @@ class Loads:
             {group: share.impedance for group, share in shares.items()},
             {group: compute_closed_strength(sim, grounded, robot, group) for group in shares},
         )
-
-    @property
-    def _start(self) -> int:
-        return derive_seed(self.seed, SECTION)  # as optimize and iterate measure it
-
-    def _bare(self, world: World) -> Compliance:
-        for measured, compliance in self.bare:
-            if measured == world:
-                return compliance
-        self.bare.append((world, measure(world, NoGrounding(), self._start)))
-        return self.bare[-1][1]

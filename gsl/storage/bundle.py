@@ -6,6 +6,7 @@ import ast
 import importlib.util
 import sys
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 
 from gsl.errors import ConfigError
@@ -13,6 +14,7 @@ from gsl.errors import ConfigError
 RUNNER = "gsl.runner.process"
 _STAND_INS = {f"gsl.core.{name}": f"gsl.runner.stand_in.{name}" for name in ("setting", "compiled", "validation")}
 _STAND_INS["gsl"] = "gsl.runner.stand_in.face"
+SOURCES = 256  # that are parsed once a process: a chain asks the robot four times, with some forty modules each
 _THERE = {*sys.stdlib_module_names, "numpy"}
 
 
@@ -38,22 +40,27 @@ def bundle(modules: tuple[str, ...]) -> dict[str, bytes]:
 
 def _find_imports(path: Path, module: str) -> Iterator[str]:
     """Yield the modules that a source imports, those that are there anyway left out."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names = [alias.name for alias in node.names]
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-            names = [name for name in names if name == node.module or _is_module(name)]
-        else:
-            continue
+    for parent, names in _read_imports(path.read_text(encoding="utf-8")):
         for name in names:
             top = name.partition(".")[0]
-            if top in _THERE:
+            if top in _THERE or not (name == parent or _is_module(name)):
                 continue
             if top not in ("gsl", module.partition(".")[0]):
                 problem = f"{module} needs {top}, but beside a robot there is numpy alone"
                 raise ConfigError("policy", problem)
             yield name
+
+
+@lru_cache(SOURCES)
+def _read_imports(source: str) -> tuple[tuple[str, tuple[str, ...]], ...]:
+    """Return what a source imports: each module with what may be modules below it."""
+    imports: list[tuple[str, tuple[str, ...]]] = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Import):
+            imports += [(alias.name, (alias.name,)) for alias in node.names]
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            imports.append((node.module, (node.module, *(f"{node.module}.{alias.name}" for alias in node.names))))
+    return tuple(imports)
 
 
 def _is_module(name: str) -> bool:

@@ -8,8 +8,10 @@ it rises until the joint gives way (its strength). The grounding sees and acts o
 from __future__ import annotations
 
 import math
+import pickle
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,7 @@ SETTLING, CYCLES = 1, 3  # cycles before the measurement and in it
 RATE, MOST = 0.3, 1.4  # of the rising load [effort/s], and where it ends [effort]: in 3 s to the nominal limit
 DRAG = 0.25  # on a joint that gives way [effort·s/rad]: without it the load would also have to move its inertia
 BEFORE = -1e-9  # latest time of a clock before an episode, whose zero is rounded [s]
+REMEMBERED = 16  # robots without a grounding, measured once a process: a study has a few worlds and many trials
 YIELDED = 0.1  # deflection beyond the linear one at which a joint has given way [rad]: 5 times the NAO's at its limit
 
 
@@ -97,17 +100,38 @@ def measure(world: Any, grounding: Grounding, seed: int) -> Compliance:
     """
     if not isinstance(world, BulletWorld):
         raise ConfigError("world", "only a robot in Bullet can be loaded from outside")
-    held, robot = replace(world, floating=False, start_noise=0.0), world.plant.robot
-    quiet = getattr(grounding, "deterministic", grounding)
+    held = replace(world, floating=False, start_noise=0.0)
+    plant = replace(noiseless(held.plant), pushes=())
+    if isinstance(grounding, NoGrounding) and plant.hook is None:
+        physics = held.step, held.iterations, held.period, held.settle, held.motors
+        return _measure_once(_Alone(pickle.dumps((plant, physics)), held, plant))
+    return _load_joints(held, plant, getattr(grounding, "deterministic", grounding), seed)
+
+
+@dataclass(frozen=True)
+class _Alone:
+    """A robot without a grounding, which no seed changes: equal where plant and physics are, byte by byte."""
+
+    key: bytes
+    world: BulletWorld = field(compare=False)
+    plant: Plant = field(compare=False)
+
+
+@lru_cache(REMEMBERED)
+def _measure_once(robot: _Alone) -> Compliance:
+    return _load_joints(robot.world, robot.plant, NoGrounding(), 0)
+
+
+def _load_joints(world: BulletWorld, plant: Plant, grounding: Grounding, seed: int) -> Compliance:
+    robot, env = plant.robot, BulletEnv(world, plant=plant)
     effort = np.array([robot.joint(name).effort for name in robot.motors])
-    quantities, apart = np.zeros((4, len(robot.motors))), isinstance(grounding, NoGrounding) and separate(world.plant)
-    env = BulletEnv(held, plant=replace(noiseless(held.plant), pushes=()))
+    quantities, apart = np.zeros((4, len(robot.motors))), isinstance(grounding, NoGrounding) and separate(plant)
     for number, loaded in enumerate(rounds(robot) if apart else np.eye(len(robot.motors), dtype=bool)):
-        swing = Swing(AMPLITUDE * effort * loaded, held.step)
-        hold(env, quiet, swing, swing.duration, derive_seed(seed, "swing", number))
+        swing = Swing(AMPLITUDE * effort * loaded, world.step)
+        hold(env, grounding, swing, swing.duration, derive_seed(seed, "swing", number))
         quantities[:3, loaded] = swing.answer()[:, loaded]
         rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, quantities[0])
-        hold(env, quiet, rising, MOST / RATE, derive_seed(seed, "yield", number))
+        hold(env, grounding, rising, MOST / RATE, derive_seed(seed, "yield", number))
         quantities[3, loaded] = np.where(rising.yielded, rising.torque, MOST * effort)[loaded]
     env.close()
     return Compliance(robot.motors, joint_groups(robot), *quantities)

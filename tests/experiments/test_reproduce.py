@@ -72,7 +72,8 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out += ["rank=false"] if what in ("worlds", "motion") else []  # table 2 ranks
     left_out += ["iterate.iterations=1"] if what == "table3" else []
     left_out += ["recipe.forward=linear"] if what in ("table3", "table4") else []  # no choice of a family
-    left_out += ["iterate.aggregate=true"] if what == "table4" else []
+    left_out += ["iterate.aggregate=true", "iterate.budget.check=2"] if what == "table4" else []
+    left_out += ["iterate.forward_model.epochs=5"] if what == "table2" else []
     said = done("reproduce", what, *FEW, *SHORT, *left_out, folder=tmp_path)
     assert " for all of its results; a study that was stopped goes on where it was" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
@@ -387,21 +388,28 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
 
 def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
     few = (*FEW, "iterate.optimizer.generations=1", "iterate.task.duration=1.2", "recipe.forward=linear")
-    said = done("reproduce", "budget", *few, "budgets=[4,6]", folder=tmp_path)
+    with open_hydra(None):
+        study = prepare(resolve(compose("reproduce_budget", ["preset=toy", "budgets=[4,6]"])))[0]
+    cells = [("none", 0), ("gat", 4), ("sgat", 4), ("gat", 6), ("sgat", 6)]
+    assert [*study.recipes] == [(1, *cell) for cell in cells]
+    said = done("reproduce", "budget", *few, "budgets=[4]", folder=tmp_path)
+    assert "for all of its results" in said.err
+    assert "gat, 4 trajectories, trial 1: grounded simulator against" in said.err
     folder = tmp_path / "runs/budget/reproduce"
+    first = json.loads((folder / "points.json").read_text())
+    assert [(point["method"], point["trajectories"]) for point in first] == cells[:3]
+    said = done("reproduce", "budget", *few, "budgets=[4,6]", "~methods.sgat", "force=true", folder=tmp_path)
+    assert "gat, 4 trajectories" not in said.err  # it is there
     points = json.loads((folder / "points.json").read_text())
-    made = [(point["method"], point["trajectories"]) for point in points]
-    assert made == [("none", 0), ("gat", 4), ("sgat", 4), ("gat", 6), ("sgat", 6)]
-    assert all(point["error"] > 0.0 < point["bare"] for point in points[1:])
-    assert points[1]["error"] != points[3]["error"]
+    assert [(point["method"], point["trajectories"]) for point in points] == [*cells[:2], cells[3]]
+    assert all(point["error"] > 0.0 < point["bare"] for point in (*points[1:], first[2]))
+    assert points[1]["error"] != points[2]["error"]
     assert len(list((tmp_path / "runs/budget").rglob("collect_real"))) == 2  # what the methods share
     refused = gsl("reproduce", "budget", *few, "budgets=[6,6]", "name=n", folder=tmp_path)
     assert refused.lines == ["gsl reproduce budget: budgets = [6,6]: are to rise, the least of them first"]
-    assert points[1]["bare"] == points[4]["bare"]  # measured on the same trajectories
+    assert points[2]["bare"] == first[2]["bare"]  # measured on the same trajectories
     assert (folder / "budget.png").stat().st_size > 10_000
     assert " otherwise. 1 trial. Made by " in (folder / "table.md").read_text()
-    assert "for all of its results" in said.err
-    assert "gat, 4 trajectories, trial 1: grounded simulator against" in said.err
     (tmp_path / "half.json").write_text((folder / "points.json").read_text())
     part = "budgets=[6]", "~methods.sgat", "name=part", "known=half.json"  # a budget is asked for by itself
     assert "2 of this study's 2 results are in" in done("reproduce", "budget", *few, *part, folder=tmp_path).err

@@ -107,6 +107,8 @@ def test_it_goes_through_a_search_and_an_iteration(tmp_path: Path) -> None:
     assert metrics["grounding_acceptable"]
     late = ("real=nao_ideal", "real.effects.command_latency.delay=0.02")
     effects = "grounding.effects={command_latency:{delay:0.02}}"
-    said = done("iterate", *SMALL, *late, "grounding=effects_torque_noise", effects, "name=two", folder=tmp_path)
+    few = ("task.duration=1.2", "optimizer.generations=1", "optimizer.candidates=4")
+    chosen = ("grounding=effects_torque_noise", effects, "name=two")
+    said = done("iterate", *SMALL, *few, *late, *chosen, folder=tmp_path)
     assert "real data: " in said.out
     assert json.loads((tmp_path / "runs/two/iteration_01/optimize/metrics.json").read_text())["effects"]

@@ -122,7 +122,7 @@ def test_workers_that_do_not_start_are_one_line(monkeypatch: pytest.MonkeyPatch)
 
 def test_trials_of_a_study_go_to_the_workers(address: str, tmp_path: Path) -> None:
     left = ("ane_01", "ane_02", "gat", "gat_005", "effects", "effects_gat")
-    words = ("compare", "preset=toy", "trials=2", "iterate.task.duration=1.6", "iterate.workers=1", "~worlds.nao_weak")
+    words = ("compare", "preset=toy", "trials=2", "iterate.task.duration=1.2", "iterate.workers=1", "~worlds.nao_weak")
     words = (*words, *(f"~methods.{name}" for name in left), "preset.generations=1", "preset.candidates=4")
     done(*words, "name=here", folder=tmp_path)
     said = done(*words, "name=there", "executor=dask", f"address={address}", folder=tmp_path)

@@ -73,7 +73,7 @@ def test_every_link_is_there_and_nothing_is_done_twice(air: tuple[Path, Said]) -
 
 def test_a_transformation_inside_learns_from_the_diagnosed_simulator(air: tuple[Path, Said]) -> None:
     folder, _ = air
-    said = done(*LINE, "grounding=effects_gat", "out=runs/air/with_gat", folder=folder)
+    said = done(*LINE, "grounding=effects_gat", "recipe.forward=linear", "out=runs/air/with_gat", folder=folder)
     assert any(line.startswith(f"{FIRST}/diagnose: ") and "(unchanged)" in line for line in said.lines)
     assert "command_latency" in loaded(folder / FIRST / "collect_sim/config.yaml")["world"]["effects"]
     models = [loaded(folder / FIRST / f"{stage}/config.yaml")["model"] for stage in ("train_inverse", "train_forward")]
@@ -110,8 +110,9 @@ def test_the_next_experiment_can_be_played_and_has_a_repeat(air: tuple[Path, Sai
 def test_compare_sets_effects_beside_the_others(tmp_path: Path) -> None:
     left = ("none", "ane_01", "ane_02", "gat", "gat_005")
     chosen = [f"~methods.{name}" for name in left] + ["~worlds.nao_weak", "trials=1", "preset=toy"]
-    small = ("iterate.task.duration=1.6", "iterate.workers=1", "worlds.nao_worn.effects={command_latency:{delay:0.02}}")
+    small = ("iterate.task.duration=1.2", "iterate.workers=1", "worlds.nao_worn.effects={command_latency:{delay:0.02}}")
     few = (f"iterate.diagnosis.without={OTHERS}", "recipe.forward=linear", "iterate.optimizer.generations=1")
+    few += ("iterate.optimizer.candidates=4",)
     done("compare", *chosen, *small, *few, "name=c", folder=tmp_path)
     trials = {trial["method"]: trial for trial in loaded(tmp_path / "runs/c/compare/trials.json")}
     assert list(trials) == ["effects", "effects_gat"]
@@ -161,7 +162,8 @@ def test_an_identification_that_finds_nothing_better_leaves_the_simulator_as_it_
 @pytest.mark.parametrize(("grounding", "predicts"), [("sgat", "mixture"), ("gat_gated", "point"), ("randomised", "")])
 def test_every_other_grounding_goes_through_an_iteration(grounding: str, predicts: str, tmp_path: Path) -> None:
     chosen = [f"grounding={grounding}", *(["grounding.predicts=mixture"] if predicts == "mixture" else [])]
-    said = done(*LINE[:-2], f"name={grounding}", "accept=true", *chosen, folder=tmp_path)
+    few = ("forward_model.epochs=5", "task.duration=1.2", "optimizer.generations=1", "optimizer.candidates=4")
+    said = done(*LINE[:-2], f"name={grounding}", "accept=true", *chosen, *few, folder=tmp_path)
     assert "real data: " in said.out
     optimized = loaded(tmp_path / f"runs/{grounding}/iteration_01/optimize/metrics.json")
     assert ("width" if grounding == "randomised" else "alpha") in optimized

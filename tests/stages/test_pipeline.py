@@ -8,6 +8,7 @@ from shutil import copytree
 
 import pytest
 from browser import check_seen
+from chains import read_iterate, search
 from commands import SMALL, Said, done, gsl, started
 from page_reader import Page, check_alone, words
 
@@ -263,10 +264,9 @@ def test_an_unchanged_iteration_shows_its_table_again(whole: tuple[Path, Said]) 
 @pytest.mark.parametrize("grounding", ["gat_residual", "gat_gated"])
 def test_models_of_two_joints_ground_no_others(grounding: str, tmp_path: Path) -> None:
     line = ("experiment=arm", "preset=toy", f"grounding={grounding}", "grounding.x=auto", "accept=true", "workers=1")
-    done("iterate", *line, "forward_model.epochs=5", "task.duration=1.2", folder=tmp_path)
-    metrics = next(tmp_path.rglob("optimize/metrics.json"))
-    assert set(json.loads(metrics.read_text())["x"]) <= {"LShoulderPitch", "RShoulderPitch"}
-    assert json.loads((metrics.parent / "grounding.json").read_text())["reachability"]["by_joint"].keys() == {
+    artifact = search(read_iterate(*line, "forward_model.epochs=5", "task.duration=1.2"), tmp_path)
+    assert set(artifact.metrics["x"]) <= {"LShoulderPitch", "RShoulderPitch"}
+    assert json.loads((artifact.folder / "grounding.json").read_text())["reachability"]["by_joint"].keys() == {
         "LShoulderPitch",
         "RShoulderPitch",
     }

@@ -118,10 +118,11 @@ def test_a_servo_stands_on_what_is_switched_on(air: tuple[Path, Said]) -> None:
 
 def test_compare_and_effects_servo_share_the_flight(air: tuple[Path, Said]) -> None:
     folder, _ = air
-    line = ("compare", *SMALL[:1], "trials=1", "name=both", "iterate.task.duration=1.6", "iterate.workers=1")
+    line = ("compare", *SMALL[:1], "trials=1", "name=both", "iterate.task.duration=1.2", "iterate.workers=1")
     worlds = [f"~worlds.{name}" for name in ("nao_weak",)]
     methods = [f"~methods.{name}" for name in ("none", "ane_01", "ane_02", "gat", "gat_005", "effects_gat")]
     few = (f"iterate.diagnosis.without={OTHERS}", "iterate.optimizer.generations=1")
+    few += ("iterate.optimizer.candidates=4",)
     said = done(*line, *worlds, *methods, "+grounding@methods.effects_servo=effects_servo", *few, folder=folder)
     document = loaded(folder / "runs/both/compare/metrics.json")
     assert {summary["method"] for summary in document["summaries"]} == {"effects", "effects_servo"}
@@ -154,7 +155,17 @@ def test_bad_input_gets_one_line(air: tuple[Path, Said], changes: tuple[str, ...
 def test_walks_bring_walks_nearer_and_a_further_member_is_as_near(air: tuple[Path, Said]) -> None:
     folder, _ = air
     world = [word.replace("real", "world", 1) for word in SOFT]
-    done("collect", "role=real", *SMALL, *world, "episodes=2", "neighbours=0", "name=walked", folder=folder)
+    done(
+        "collect",
+        "role=real",
+        *SMALL,
+        *world,
+        "task.duration=1.2",
+        "episodes=2",
+        "neighbours=0",
+        "name=walked",
+        folder=folder,
+    )
     done(*TRAIN, "walks=walked/collect_real", "members=2", "name=walked", folder=folder)
     metrics = loaded(folder / "runs/walked/train_servo/metrics.json")
     assert metrics["walks"]["floors_after"] < 0.5 * metrics["walks"]["floors_before"]

@@ -203,14 +203,15 @@ def test_the_same_by_hand(iterated: Path, home: Path) -> None:
     )
     np.testing.assert_array_equal(here["ratio"], there["ratio"])
     chosen = ("grounding=shrink", "grounding.model=hand", "optimizer=random_search", "accept=true", "name=hand")
+    chosen += ("optimizer.generations=1", "optimizer.candidates=2")
     done("optimize", *OWN, *SMALL, *chosen, folder=home)
 
 
 def test_both_appear_in_compare(iterated: Path, home: Path) -> None:
-    methods = [f"~methods.{name}" for name in ("ane_01", "ane_02", "gat", "gat_005", "effects", "effects_gat")]
+    methods = [f"~methods.{name}" for name in ("none", "ane_01", "ane_02", "gat", "gat_005", "effects", "effects_gat")]
     own = ("+grounding@methods.shrink=shrink", "optimizer@iterate.optimizer=random_search", "trials=1")
     own += ("iterate.optimizer.generations=1",)
-    done("compare", *OWN, *SMALL[:1], "iterate.task.duration=1.6", "iterate.workers=1", *methods, "~worlds.nao_weak",
+    done("compare", *OWN, *SMALL[:1], "iterate.task.duration=1.2", "iterate.workers=1", *methods, "~worlds.nao_weak",
          *own, "name=set", folder=home)  # fmt: skip
     assert "| shrink |" in (home / "runs/set/compare/table.md").read_text()
 
@@ -264,7 +265,8 @@ class FromSim(Trainable):
 def test_what_learns_from_the_simulator_alone_costs_no_real_data(home: Path) -> None:
     (home / "own_sim.py").write_text(SIM_ALONE)
     (home / "mine/grounding/sim_alone.yaml").write_text("_target_: own_sim.FromSim\nmodel: ''\n")
-    done("iterate", *OWN, *SMALL, "grounding=sim_alone", "optimizer=random_search", "name=alone", folder=home)
+    search = ("optimizer=random_search", "optimizer.generations=1", "optimizer.candidates=2")
+    done("iterate", *OWN, *SMALL, "grounding=sim_alone", *search, "name=alone", folder=home)
     metrics = json.loads((home / "runs/alone/iterate/metrics.json").read_text())
     assert metrics["learned_from"] == 0
     assert not (home / "runs/alone/iteration_01/collect_real").exists()

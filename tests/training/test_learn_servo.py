@@ -244,9 +244,9 @@ def test_a_delay_stays_within_what_servos_remember() -> None:
     assert servo.model.numbers["delay"].max() <= 15 * 0.001 + 1e-12
 
 
-def test_members_differ_by_what_the_log_leaves_open() -> None:
+def test_members_differ_by_what_the_log_leaves_open(slow: LearnedServo) -> None:
     servo = learn_servo(prepared(SLOW), nominal(ROBOT), STEP, labelled=False, seed=1, threads=1, members=3)
-    for name, values in learned(prepared(SLOW)).model.arrays().items():  # the first is what it is by itself
+    for name, values in slow.model.arrays().items():  # the first is what it is by itself
         np.testing.assert_array_equal(servo.model.arrays()[name], values)
     gains = [float(model.numbers["kp"][0]) for model in (servo.model, *(member.model for member in servo.further))]
     assert len(set(gains)) == 3

@@ -6,7 +6,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from commands import done, gsl, refused
+from chains import read_iterate, train
+from commands import gsl, refused
 from toy_plant import LAYOUT, QUICK, SLOW, ToyEnv, a_batch
 
 from gsl.core.console import Silent
@@ -284,19 +285,9 @@ def test_noise_on_real_actions_is_part_of_what_was_done(tmp_path: Path) -> None:
 
 
 def test_a_residual_is_trained_whatever_the_recipe_says_of_models(tmp_path: Path) -> None:
-    few = ("budget.real_episodes=3", "budget.sim_episodes=3", "optimizer.generations=1", "optimizer.candidates=4")
-    done(
-        "iterate",
-        "recipe=paper",
-        "preset=toy",
-        "task.duration=1.6",
-        "grounding=gat_residual",
-        *few,
-        "workers=1",
-        "accept=true",
-        folder=tmp_path,
-    )
-    model = read_forward_model(str(tmp_path / "runs/quick-start/iteration_01/train_forward/forward_model.safetensors"))
+    few = ("budget.real_episodes=3", "budget.sim_episodes=3", "task.duration=1.6", "workers=1")
+    train(read_iterate("recipe=paper", "preset=toy", "grounding=gat_residual", *few), tmp_path)
+    model = read_forward_model(str(tmp_path / "train_forward/forward_model.safetensors"))
     assert model.base is not None and model.encoding == "plain"
 
 

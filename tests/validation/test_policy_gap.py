@@ -131,11 +131,11 @@ def test_two_policies_have_no_order(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_an_iterate_stands_for_its_evaluations(arms: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = ("experiment=arm", "preset=toy", "grounding=none", "task.duration=0.4", "sim=nao_ideal", "workers=1")
-    done("iterate", "name=whole", "grounding=gat", *sizes, folder=tmp_path)
+    done("iterate", "name=whole", *sizes, folder=tmp_path)
     monkeypatch.chdir(tmp_path)
     assert [path.name for path in list_parents("whole").values()] == ["iterate", "evaluate", "optimize"]
     assert [policy.name for policy in real_returns("whole", AIR).policies] == list(NAMES)
-    done("iterate", "name=twice", "iterations=2", "grounding=gat", *sizes, folder=tmp_path)
+    done("iterate", "name=twice", "iterations=2", *sizes, folder=tmp_path)
     policies = real_returns("twice", AIR).policies  # the second begins with what the first has returned
     first, second = ([f"iteration_0{k}/{name}" for name in names] for k, names in ((1, NAMES), (2, NAMES[1:])))
     assert [entry.name for entry in policies] == [*first, *second]

@@ -124,4 +124,4 @@ def test_an_iteration_whose_grounding_is_refused_leaves_what_the_one_before_foun
     first, second = ((place / "policies.json").read_text() for place in places)
     assert first == second and not (home / "runs/chain/iteration_02/optimize").exists()
     assert "(unchanged)" in done(*line, folder=home).out
-    assert refused in gsl(*line, "grounding.wrong=0", "name=other", folder=home).lines[-1]
+    assert refused in gsl(*line, "grounding.wrong=0", "force=true", folder=home).lines[-1]

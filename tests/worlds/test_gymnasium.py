@@ -55,6 +55,7 @@ SHALLOW = tuple(
     f"{model}.{size}" for model in ("forward_model", "inverse_model") for size in ("epochs=20", "hidden=[32]")
 )
 OF_TRIALS = tuple(f"iterate.{setting}" for setting in SHALLOW)
+BRIEF = ("iterate.optimizer.rollout=256", "further.rollout=256")  # of TRPO, which steps whole rollouts
 
 
 class Strange(gymnasium.Env):
@@ -381,6 +382,7 @@ def test_groundings_of_environments_are_compared(tmp_path: Path) -> None:
     search = ("optimizer@iterate.optimizer=cma_es", "iterate.policy.hidden=[]", "iterate.optimizer.sigma=0.5")
     few = ("trials=2", "preset=toy", "~methods.ane_02", "~methods.ane_05", "~methods.sgat", *OF_TRIALS)
     few += tuple(f"iterate.budget.{name}=4" for name in ("real_episodes", "sim_episodes", "episodes", "confirmation"))
+    few += ("iterate.budget.rollouts=2",)
     slope = ("worlds.real.kwargs.slope=2", "iterate.workers=1")
     said = done("compare", "experiment=environments", "name=e", *few, *worlds, *slope, *search, folder=tmp_path)
     home = tmp_path / "runs/e"
@@ -638,7 +640,7 @@ def test_figure_12_is_one_command(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "noises=[0.3]", "workers=1", "iterate.budget.real_episodes=6", "iterate.budget.sim_episodes=8")
-    few += OF_TRIALS
+    few += (*OF_TRIALS, *BRIEF)
     said = done("reproduce", "fig12", "preset=toy", *few, "iterate.budget.episodes=3", *WITHOUT_NOISE, folder=tmp_path)
     folder = tmp_path / "runs/fig12/reproduce"
     points = json.loads((folder / "points.json").read_text())
@@ -660,7 +662,7 @@ def test_figure_13_is_one_command(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "workers=1", "iterate.budget.real_episodes=3", "iterate.budget.sim_episodes=3", "~methods.sgat")
-    few += OF_TRIALS
+    few += (*OF_TRIALS, *BRIEF)
     few += ("iterate.budget.episodes=1", "iterate.budget.rollouts=1")
     left = ("noises=[0.6]", "~methods.ane_02", "~methods.ane_06", "~worlds.noisy")
     done("reproduce", "fig13", "preset=toy", *few, *left, folder=tmp_path)
@@ -679,7 +681,7 @@ def test_rounds_go_on_from_what_the_real_world_chose(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "workers=1", "iterate.budget.real_episodes=3", "iterate.budget.sim_episodes=3", "~methods.sgat")
-    few += OF_TRIALS
+    few += (*OF_TRIALS, *BRIEF)
     few += ("iterate.budget.episodes=2", "iterate.budget.rollouts=1", "iterate.budget.confirmation=3")
     left = (
         "~methods.ane",
@@ -734,7 +736,7 @@ def test_figure_12_goes_on_with_a_search_instead(tmp_path: Path) -> None:
     pytest.importorskip("mujoco")
     pytest.importorskip("sb3_contrib")
     few = ("trials=1", "noises=[0.3]", "workers=1", "iterate.budget.real_episodes=6", "iterate.budget.sim_episodes=8")
-    few += OF_TRIALS
+    few += (*OF_TRIALS, BRIEF[0])
     search = ("optimizer@further=cma_es", "further.candidates=4", "further.generations=1", "iterate.budget.rollouts=2")
     settings = (*WITHOUT_NOISE, "~methods.gat", "iterate.policy.hidden=[]", "iterate.budget.episodes=3")
     said = done("reproduce", "fig12", "preset=toy", *few, *search, *settings, folder=tmp_path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -89,9 +90,13 @@ class Search:
         batch, plant, floor = fault.mend(self.batch), fault.change(self.plant), fault.refloor(self.floor)
         return replace(self, batch=batch, plant=plant, floor=floor)
 
+    @cached_property
+    def _log(self) -> Log:
+        return cut_motions(self.batch, self.plant)
+
     def _contest(self, fault: Fault | None = None) -> Contest:
         mended = self._mend(fault) if fault else self
-        log = cut_motions(mended.batch, mended.plant)
+        log = self._log if mended.batch is self.batch else mended._log  # gains leave rows as they are
         if not len(log.train) or not len(log.held_out):
             raise GslError("too short for a window to fit and one to check")
         return Contest(mended.plant, self.step, log, mended.floor, self.tick)
@@ -142,9 +147,8 @@ class Search:
         if fault.kind != "gains":
             return False
         low, high = (bound[[KP, KD]] for bound in parameter_bounds(self.plant))
-        own = (
-            np.log(np.array([fault.value["kp"], fault.value["kd"]])) + after.parameters[[KP, KD]][:, list(fault.joints)]
-        )
+        factors = np.log(np.array([fault.value["kp"], fault.value["kd"]]))
+        own = factors + after.parameters[[KP, KD]][:, list(fault.joints)]
         return bool(((own >= low) & (own <= high)).all(axis=0).mean() >= HALF)
 
     def _without_physics(self, fit: Fit) -> Stand | None:
@@ -261,21 +265,18 @@ class Search:
         """Yield the exchange of joints in question that fits best, from how well each joint replays each channel."""
         matrix = np.diag(base[bad] * PROMISING)
         for turn in range(1, len(bad)):
-            order = list(range(len(base)))
-            for place, joint in enumerate(bad):
-                order[joint] = bad[(place + turn) % len(bad)]
-            cost = self._screen(permute(order, BOTH))
+            order = np.arange(len(base))
+            order[bad] = np.roll(bad, -turn)
+            cost = self._screen(permute(order.tolist(), BOTH))
             for place, joint in enumerate(bad):
                 matrix[place, (place + turn) % len(bad)] = np.inf if cost is None else cost[joint]
         _, chosen = linear_sum_assignment(np.where(np.isfinite(matrix), matrix, 1e6))
         if (chosen == np.arange(len(bad))).all():
             return
-        order = list(range(len(base)))
-        for place, other in enumerate(chosen):
-            order[bad[place]] = bad[int(other)]
-        fault = permute(order, BOTH)
-        cost = self._screen(fault)
-        if cost is not None and (drop := float((base - cost).sum())) > 0.0:
+        order = np.arange(len(base))
+        order[bad] = np.array(bad)[chosen]
+        fault = permute(order.tolist(), BOTH)
+        if (cost := self._screen(fault)) is not None and (drop := float((base - cost).sum())) > 0.0:
             yield drop, fault
 
 
