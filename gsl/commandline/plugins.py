@@ -7,6 +7,9 @@ from __future__ import annotations
 
 import ast
 import inspect
+import os
+import sys
+from functools import lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from importlib.util import find_spec
 from pathlib import Path
@@ -53,7 +56,20 @@ class Commands(TyperGroup):
 
 def plugins() -> dict[str, EntryPoint]:
     """Return the entry points by the name of their command."""
+    return _find(tuple((place, _changed(place)) for place in sys.path))
+
+
+@lru_cache(maxsize=1)  # every word that is typed asks for them, and each time all packages would be read
+def _find(places: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
+    """Return the entry points of packages in these places, as they were at these times."""
     return {entry_point.name: entry_point for entry_point in entry_points(group=GROUP)}
+
+
+def _changed(place: str) -> int:
+    try:
+        return os.stat(place or ".").st_mtime_ns
+    except OSError:
+        return 0
 
 
 def load(entry_point: EntryPoint) -> Any:
