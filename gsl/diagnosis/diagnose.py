@@ -10,7 +10,7 @@ from gsl.core.body import Robot, lump
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.angles import with_log_in_angles
-from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, name_in_place
 from gsl.diagnosis.hypothesis.problem import LATENCY, Problem
 from gsl.diagnosis.log.files import on_ground
 from gsl.diagnosis.log.log import Log, cut_log
@@ -24,7 +24,7 @@ from gsl.diagnosis.simulate.in_the_air import change
 from gsl.diagnosis.simulate.on_ground import Walking, model_error
 from gsl.diagnosis.simulate.simulator import Bench
 from gsl.diagnosis.verdict.findings import Findings
-from gsl.diagnosis.verdict.self_test import Trial, duel, simulate_nulls
+from gsl.diagnosis.verdict.self_test import Trial, duel, measure_mistakes, simulate_nulls
 from gsl.diagnosis.verdict.servo_law import find_forms, learn_laws
 from gsl.diagnosis.verdict.verdict import Judge
 from gsl.errors import InputError
@@ -161,6 +161,7 @@ def _judge(log: Log, rivals: Sequence[Hypothesis], trials: Sequence[Trial], opti
     return Judge(
         expected * (1.0 + log.noise.slack),
         _margins(rivals, own),
+        measure_mistakes(rivals, trials),
         how.walk_doubt if log.walking else how.shaking_doubt * log.shaking_share,
         log.walking,
         not log.by_record and log.motions == 1,
@@ -176,5 +177,5 @@ def _margins(rivals: Sequence[Hypothesis], own: Sequence[Trial]) -> dict[str, fl
         return {}
     chosen = rivals[0]
     spreads = np.std([[cost - trial.costs[0] for cost in trial.costs[1:]] for trial in own], axis=0, ddof=1)
-    names = [next((name for name in rival.names if name not in chosen.names), rival.names[-1]) for rival in rivals[1:]]
+    names = [name_in_place(chosen, rival) for rival in rivals[1:]]
     return {name: float(value) for name, value in zip(names, spreads, strict=True)}

@@ -19,6 +19,7 @@ from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.search.stepwise import Search, Selection
 from gsl.diagnosis.settings import SearchSettings, VerdictSettings
 from gsl.diagnosis.simulate import calibration
+from gsl.diagnosis.verdict.self_test import Trial, measure_mistakes
 from gsl.diagnosis.verdict.verdict import Judge
 
 PER_SAMPLE = np.full(8, 100.0)
@@ -63,6 +64,31 @@ def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
     tried = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, *rivals))
     assert [cause.rival for cause in tried.causes] == ["load_friction", "load_friction"]
     assert min(cause.probability for cause in tried.causes) > VerdictSettings.unrivalled
+
+
+def test_a_rival_whose_own_logs_get_the_same_answer_is_not_told_apart() -> None:
+    joint = friction("shoulder", 100.0)
+    load = replace(claim("load_friction", [0.2], ("coefficient",)), costs=np.full(8, 150.0), counts=PER_SAMPLE)
+    logs = {  # costs of both, in logs of the truth
+        joint.names: [(90.0, 500.0), (100.0, 460.0)],
+        load.names: [(100.0, 400.0), (100.0, 390.0)],
+    }
+
+    def mistakes(costs: dict[tuple[str, ...], list[tuple[float, float]]]) -> dict[str, float]:
+        trials = [Trial(truth, (), pair, 1.0, np.zeros(1)) for truth, pairs in costs.items() for pair in pairs]
+        return measure_mistakes((joint, load), trials)
+
+    assert mistakes(logs) == {"load_friction": 1.0}  # ahead by 290 and more, where the real log has it ahead by 400
+    assert mistakes({**logs, load.names: [(100.0, 400.0), (400.0, 90.0)]}) == {"load_friction": 0.5}
+    assert mistakes({**logs, load.names: [(100.0, 150.0), (400.0, 90.0)]}) == {"load_friction": 0.0}
+    assert mistakes({joint.names: logs[joint.names]}) == {}
+    tried = selection(joint, load)
+    assert Judge(1.0).judge(tried).word == "causes"
+    assert Judge(1.0, mistakes={"load_friction": 0.0}).judge(tried) == Judge(1.0).judge(tried)
+    for share, probability in ((0.5, 0.745), (1.0, 0.5)):
+        verdict = Judge(1.0, mistakes={"load_friction": share}).judge(tried)
+        assert verdict.word == "inseparable" and verdict.inseparable == (("coulomb_friction", "load_friction"),)
+        assert verdict.causes[0].probability == pytest.approx(probability, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -168,3 +168,8 @@ def share_of_excess(
 def _resample(count: int, samples: int, seed: int) -> np.ndarray:
     """Return samples with replacement, as indices of shape (samples, count)."""
     return np.random.default_rng(seed).integers(0, count, (samples, count))
+
+
+def name_in_place(chosen: Hypothesis, rival: Hypothesis) -> str:
+    """Return the effect that a rival has and the chosen hypothesis has not; its last one where it has the same."""
+    return next((name for name in rival.names if name not in chosen.names), rival.names[-1])

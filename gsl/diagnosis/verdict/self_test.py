@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost, name_in_place
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
@@ -24,6 +24,7 @@ from gsl.diagnosis.simulate.calibration import draw_shifts, no_shifts
 from gsl.diagnosis.simulate.in_the_air import change, play
 from gsl.diagnosis.simulate.simulator import Bench
 
+HALF = 0.5  # of a lead: two logs of one cause differ by so much
 NULL_LEADS = 4  # that are fitted in a log without an effect: the best of them is what chance gains
 
 
@@ -127,3 +128,24 @@ def duel(log: Log, problem: Problem, rivals: Sequence[Hypothesis], options: Opti
             trials.append(Trial(truth.names, winner.names, costs, fits[k].level, errors))
             problem.tick("")
     return trials
+
+
+def measure_mistakes(rivals: Sequence[Hypothesis], trials: Sequence[Trial]) -> dict[str, float]:
+    """Return the share of each rival's simulated logs that the first hypothesis explains better than their truth does.
+
+    Only logs count in which it is ahead by at least half as much as in the real one: such a lead says nothing here.
+
+    Args:
+        rivals: The chosen hypothesis, then the others.
+        trials: Of all of them, from `duel`.
+
+    Returns:
+        Shares by the effect that a rival has in the place of the chosen one's.
+    """
+    chosen, shares = rivals[0], {}
+    for k, rival in enumerate(rivals[1:], start=1):
+        lead = HALF * max(rival.cost - chosen.cost, 0.0)
+        own = [trial.costs[k] - trial.costs[0] for trial in trials if trial.truth == rival.names]
+        if own:
+            shares[name_in_place(chosen, rival)] = float(np.mean(np.array(own) > lead))
+    return shares

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost, gain, share_of_excess
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost, gain, name_in_place, share_of_excess
 from gsl.diagnosis.search.stepwise import Selection
 from gsl.diagnosis.settings import SearchSettings, VerdictSettings
 from gsl.effects.effect import TWINS
 
 ALIKE = tuple(frozenset(pair) for pair in TWINS.items())  # in the air
 SHARPNESS = 2.0  # of log-odds, over a margin in its spread
+EVEN = 0.5  # probability of each of two causes whose simulated logs get the same answer
 FAR = 100.0  # beyond which a strangeness is no stranger
 
 
@@ -81,6 +82,7 @@ class Judge:
     Attributes:
         expected: Cost of a residual where only noise is left.
         margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
+        mistakes: Share of a self-test's logs of a rival, by the rival's effect, that the chosen one explains better.
         doubt: Share of a cost by which that of two causes differs by chance.
         walking: Whether the robot is on the ground, where the base shows what is alike in the air.
         lone: Whether there is one motion only.
@@ -91,6 +93,7 @@ class Judge:
 
     expected: float
     margins: Mapping[str, float] = field(default_factory=dict)
+    mistakes: Mapping[str, float] = field(default_factory=dict)
     doubt: float = 0.0
     walking: bool = False
     lone: bool = False
@@ -159,9 +162,11 @@ class Judge:
         best = min((fit for fit in rivals if fit.size == chosen.size), key=by_cost, default=None)
         if best is None:
             return Cause(k, self.settings.unrivalled, None, value, low, high)
-        other = next((name for name in best.names if name not in chosen.names), best.names[-1])
+        other = name_in_place(chosen, best)
         spread = max(self.margins.get(other, 0.0), self.doubt * chosen.cost)
-        return Cause(k, self._probability(best, chosen, spread), other, value, low, high)
+        probability = self._probability(best, chosen, spread)
+        probability -= self.mistakes.get(other, 0.0) * max(0.0, probability - EVEN)
+        return Cause(k, probability, other, value, low, high)
 
     def _probability(self, rival: Hypothesis, chosen: Hypothesis, spread: float) -> float:
         """Return the probability that the chosen one is the truth and not its rival, from how much less it costs."""
