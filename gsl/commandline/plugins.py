@@ -56,7 +56,7 @@ class Commands(TyperGroup):
 
 def plugins() -> dict[str, EntryPoint]:
     """Return the entry points by the name of their command."""
-    return _find(tuple((place, _changed(place)) for place in sys.path))
+    return _find(tuple((place, _read_mtime(place)) for place in sys.path))
 
 
 @lru_cache(maxsize=1)  # every word that is typed asks for them, and each time all packages would be read
@@ -65,7 +65,7 @@ def _find(places: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
     return {entry_point.name: entry_point for entry_point in entry_points(group=GROUP)}
 
 
-def _changed(place: str) -> int:
+def _read_mtime(place: str) -> int:
     try:
         return os.stat(place or ".").st_mtime_ns
     except OSError:
