@@ -72,7 +72,9 @@ def noise_floor(
     least = np.array(max(resolution / np.sqrt(12.0), 1e-5)) if least is None else least
     groups = [group for group in _group(records, repeats, held, how) if len(group) > 1]
     white = np.maximum(white_level(records, how), least)
-    restless = _find_restless(records, white, np.maximum(how.unwhite * white, resolution), how)
+    restless = np.zeros(len(white), dtype=bool)
+    if not least.ndim:  # in the air: steps shake a walking robot
+        restless = _find_restless(records, white, np.maximum(how.unwhite * white, resolution), how)
     if groups:
         spread = [align_repeats(group, period)[:, how.settled :] for group in groups]
         square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
