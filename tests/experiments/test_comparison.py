@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
-from scipy.stats import wilcoxon
 
 from gsl.core.unit import Unit
 from gsl.tasks.own_reward import OwnReward
 from gsl.tasks.walk import Walk
 from gsl_experiments.answer import answer_comparison
-from gsl_experiments.comparison import compute_p_value, differences, orders, summaries
+from gsl_experiments.comparison import differences, orders, summaries
 from gsl_experiments.comparison_table import markdown
 from gsl_experiments.paper_cells import every_trial, one_by_one, worth
 from gsl_experiments.paper_table_2 import Table2
@@ -140,12 +138,6 @@ def test_an_order_is_claimed_by_a_signed_rank_test_over_trials_with_holms_correc
         by_pair["gat", "none"].p == by_pair["gat", "ane"].p == pytest.approx(3 * 2 / 2**6)
     )  # least of 6 pairs, times 3
     assert by_pair["ane", "none"].p == 1.0
-
-
-@pytest.mark.parametrize("apart", [(1, -2, 3, 4, 5), (0, 1, 1, -1, 2, 0), (-1, -1), (3, 1, 1, -2, 2, 4, 5, -1), (0, 0)])
-def test_few_differences_are_tested_as_scipy_does_it(apart: tuple[int, ...]) -> None:
-    few = np.array(apart, float)
-    assert compute_p_value(few) == (wilcoxon(few).pvalue if few.any() else 1.0)
 
 
 def test_a_start_that_may_be_worth_nothing_has_no_percentage() -> None:
