@@ -131,7 +131,8 @@ class SearchSettings:
     challengers: int = 2  # how many of them
     apart: float = 1.5  # spreads by which the mean calibration of a group is off that is a cause's
     many: int = 4  # joints whose mean zero is looked at
-    aside: float = 4.0  # standard errors by which it is off that are no chance
+    like: float = 5.0  # joints that the usual spread of zeros counts for, beside those of the robot itself. Estimate
+    aside: float = 3.5  # standard errors by which it is off that are no chance. Measured: 2.8 without such a cause
     restarts: int = 40  # windows that measure what a log of a walk does not show
     same_robot: float = 0.3  # of the usual spread: how far a calibration may change from a reference to the log
     clock_starts: tuple[float, ...] = (0.002, 0.02, 0.05)  # where a fit of two clocks' shift starts [s]

@@ -1,6 +1,7 @@
 """What joints share in their calibration is handed over to a cause, and a cause is split where groups differ."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.search.screening import extend
-from gsl.diagnosis.search.stepwise import Search
+from gsl.diagnosis.search.stepwise import Search, Thresholds
 from gsl.diagnosis.simulate.calibration import COULOMB, KD, no_shifts
 from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
@@ -51,11 +52,9 @@ def test_no_more_is_handed_over_than_the_bounds_take() -> None:
     np.testing.assert_allclose(left[COULOMB], np.where(MASKS["arms"], 0.05, 0.1))
 
 
-@pytest.fixture(scope="module")
-def dry() -> Problem:
-    """Return the problem of a robot whose legs have more dry friction than its arms."""
+def problem_of(effects: dict[str, Any]) -> Problem:
+    """Return the problem of a robot with some effects that swings all joints at four frequencies."""
     plant = nominal(NAO)
-    effects = {"coulomb_friction": [{"torque": 0.2, "joints": "legs"}, {"torque": 0.1, "joints": "arms"}]}
     time = PERIOD * np.arange(150)
     paths = [0.2 * np.sin(2 * np.pi * f * time)[:, None] * np.ones(len(NAO.motors)) for f in (0.4, 0.7, 1.0, 1.4)]
     paths = [path + np.array([NAO.stance.get(motor, 0.0) for motor in NAO.motors]) for path in paths]
@@ -70,6 +69,20 @@ def dry() -> Problem:
         episodes, NAO.controlled, PERIOD, {"episodes": [{"policy": str(k)} for k in range(4)], "world": {"step": 0.002}}
     )
     return Nominal(plant, 0.002).problem(cut_log(batch, NAO), Options(threads=1), lambda phase: None)
+
+
+@pytest.fixture(scope="module")
+def dry() -> Problem:
+    """Return the problem of a robot whose legs have more dry friction than its arms."""
+    return problem_of({"coulomb_friction": [{"torque": 0.2, "joints": "legs"}, {"torque": 0.1, "joints": "arms"}]})
+
+
+@pytest.mark.parametrize("offset, causes", [(0.006, 1), (0.001, 0)])
+def test_zeros_of_many_joints_stand_by_their_calibration_whatever_chance_gains(offset: float, causes: int) -> None:
+    off = problem_of({"sensor_bias": {"bias": offset, "joints": "legs"}}).only(("sensor_bias", "zero_offset"))
+    chance = Thresholds(share=0.5)  # as where joints shake
+    chosen = Search(off, off.fit_calibration(), chance).select().chosen
+    assert [candidate.scope for candidate in chosen.candidates] == ["legs"] * causes
 
 
 def test_friction_that_differs_between_legs_and_arms_is_told_apart(dry: Problem) -> None:

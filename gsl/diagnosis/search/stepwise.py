@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,11 +11,9 @@ from gsl.diagnosis.hypothesis.common_mode import shares
 from gsl.diagnosis.hypothesis.hypothesis import Gain, Hypothesis, by_cost, gain
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.search.screening import Screening, extend, screen
+from gsl.diagnosis.search.zeros import SHIFTS, explains_zeros, moves_zeros_alone, zeros_aside
 from gsl.diagnosis.settings import SearchSettings
-from gsl.diagnosis.simulate.calibration import OFFSET, SPREADS, ZERO
-from gsl.effects.effect import TWINS
-
-SHIFTS = (*TWINS, *TWINS.values())  # effects that move a joint's zero
+from gsl.diagnosis.simulate.calibration import SPREADS
 
 
 @dataclass(frozen=True)
@@ -112,6 +111,10 @@ class Search:
         if self.nothing_left():
             return Selection(chosen, chosen, (chosen,), screen(self.problem, chosen), least)
         singles, screening = extend(self.problem, self.none, self._how.leads)
+        if zeros_aside(self.problem, chosen):
+            zeros = extend(self.problem.only(SHIFTS), chosen, self._how.leads)[0]
+            seen = [single.places for single in singles]
+            singles = sorted([*singles, *(zero for zero in zeros if zero.places not in seen)], key=by_cost)
         rejected, standing = self.part_singles(singles, least)
         self.tried = [self.none, *singles]
         if standing:
@@ -127,7 +130,7 @@ class Search:
         """Whether calibration alone leaves no more than noise, in every joint, and hides nothing."""
         none, how = self.none, self._how
         quiet = none.level <= how.noise_cost and float(none.levels.max()) <= how.room
-        return quiet and not (self._lacking(none, how.room) or self._zeros_aside(none))
+        return quiet and not (self._lacking(none, how.room) or zeros_aside(self.problem, none))
 
     def part_singles(self, singles: list[Hypothesis], least: float) -> tuple[list[Hypothesis], list[Hypothesis]]:
         """Return the single effects before the first that stands, and those from it on, none if none stands.
@@ -139,7 +142,8 @@ class Search:
             least: What one has to gain over calibration alone.
         """
         flaw = self._how.flaw * self.none.cost
-        first = next((k for k, single in enumerate(singles) if stands(single, self.none, least, flaw)), len(singles))
+        stand = (k for k, single in enumerate(singles) if self._stands(single, self.none, least, flaw))
+        first = next(stand, len(singles))
         return (singles[:first], singles[first:]) if first < len(singles) else ([], [])
 
     def look_again(self, selection: Selection) -> Selection:
@@ -167,18 +171,26 @@ class Search:
         chosen = self._polish(singles[0]) if self.thresholds.share else singles[0]
         beam, level = self._distinct(singles), self._how.room
         while len({*chosen.names}) < self.most:
-            lacking = self._lacking(chosen, level)
-            if not (lacking or self._zeros_aside(chosen)):
-                break
-            problem = self.problem if lacking else self.problem.only(SHIFTS)
-            larger = [fit for base in beam for fit in extend(problem, base, self._how.leads_after)[0]]
-            self.tried += larger
-            better = [fit for fit in larger if stands(fit, chosen, *self._bar(chosen))]
+            better = self._add(self.problem, chosen, beam) if self._lacking(chosen, level) else []
+            if not better and zeros_aside(self.problem, chosen):
+                better = self._add(self.problem.only(SHIFTS), chosen, [chosen])
             if not better:
                 break
             best = min(better, key=by_cost)
             chosen, beam, level = best, [best], self._how.room_after
         return chosen
+
+    def _add(self, problem: Problem, chosen: Hypothesis, beam: Sequence[Hypothesis]) -> list[Hypothesis]:
+        """Return what stands against the chosen hypothesis of those with one effect more than one in the beam."""
+        larger = [fit for base in beam for fit in extend(problem, base, self._how.leads_after)[0]]
+        self.tried += larger
+        return [fit for fit in larger if self._stands(fit, chosen, *self._bar(chosen))]
+
+    def _stands(self, hypothesis: Hypothesis, other: Hypothesis, least: float, flaw: float) -> bool:
+        """Whether a hypothesis stands against another one; zeros of many joints stand on grounds of their own."""
+        if moves_zeros_alone(self.problem, hypothesis, other):
+            return explains_zeros(self.problem, hypothesis, other)
+        return stands(hypothesis, other, least, flaw)
 
     def _bar(self, standing: Hypothesis) -> tuple[float, float]:
         """Return what a further effect has to gain over what stands, and what a flaw of the model may gain."""
@@ -190,13 +202,6 @@ class Search:
         """Whether more is left than noise, or hidden in shifts; the cost of joints that shake does not show it."""
         hides = standing.fit.prior_cost > self._how.hidden * standing.fit.shifts.size
         return standing.level > level or hides or bool(self.problem.train.comparison.shaking.any())
-
-    def _zeros_aside(self, standing: Hypothesis) -> bool:
-        """Whether the zeros of many joints are off to one side, which those of one make are not."""
-        size = self.problem.simulator.spread * np.hypot(*SPREADS[[ZERO, OFFSET]])
-        off = standing.fit.shifts[[ZERO, OFFSET]].sum(axis=0) / size
-        scopes = [mask for mask in self.problem.scopes.values() if mask.sum() >= self._how.many]
-        return any(abs(float(off[mask].sum())) > self._how.aside * np.sqrt(mask.sum()) for mask in scopes)
 
     def _distinct(self, singles: list[Hypothesis]) -> list[Hypothesis]:
         """Return the best hypotheses of different effects, not more than the beam is wide."""
@@ -213,7 +218,7 @@ class Search:
             self.tried += fewer
             named = chosen.claims_its_names
             best = min(fewer, key=lambda fit: (named and not fit.claims_its_names, fit.cost))
-            if stands(chosen, best, *self._bar(best)):
+            if self._stands(chosen, best, *self._bar(best)):
                 break
             chosen = best
         return chosen
@@ -239,7 +244,7 @@ class Search:
             candidates = (*chosen.candidates[:k], *apart, *chosen.candidates[k + 1 :])
             parts = problem.fit(candidates, np.concatenate(values), chosen.fit.shifts, every=1)
             self.tried.append(parts)
-            if stands(parts, chosen, *self._bar(chosen)):
+            if self._stands(parts, chosen, *self._bar(chosen)):
                 return self.prune(parts)
         return chosen
 
