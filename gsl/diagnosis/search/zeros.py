@@ -23,8 +23,9 @@ def zeros_aside(problem: Problem, standing: Hypothesis) -> bool:
 
 def moves_zeros_alone(problem: Problem, hypothesis: Hypothesis, other: Hypothesis) -> bool:
     """Whether a hypothesis has nothing more than another one but zeros of many joints, and all that one has."""
-    more, wide = hypothesis.places - other.places, _wide(problem)
-    return other.places < hypothesis.places and all(effect in SHIFTS and scope in wide for effect, scope in more)
+    more = hypothesis.places - other.places
+    zeros = other.places < hypothesis.places and all(effect in SHIFTS for effect, _ in more)
+    return zeros and all(scope in _wide(problem) for _, scope in more)
 
 
 def explains_zeros(problem: Problem, hypothesis: Hypothesis, other: Hypothesis) -> bool:
