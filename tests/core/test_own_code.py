@@ -12,6 +12,8 @@ from commands import ENVIRONMENT
 
 from gsl.core.own_code import describe_own
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("package", ["gsl.core", "gsl_experiments", "gsl_benchmarks.blind"])
 def test_a_failure_in_one_of_our_packages_is_no_users_own(package: str, tmp_path: Path) -> None:

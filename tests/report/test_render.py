@@ -26,6 +26,8 @@ from gsl.rollout.rollout import Scenario, rollout
 from gsl.tasks.walk import Walk
 from gsl.worlds.camera import LIGHT, SHADOW, Camera, View
 
+pytestmark = pytest.mark.slow
+
 RED, GREEN = "#d55e00", "#009e73"
 
 

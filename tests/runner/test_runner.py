@@ -35,6 +35,8 @@ from gsl.tasks.excite import Excite
 from gsl.tasks.walk import Walk
 from gsl.worlds.external import ExternalRobot
 
+pytestmark = pytest.mark.slow
+
 CONF = Path(__file__).parents[2] / "conf"
 EXAMPLE = Path(__file__).parents[2] / "examples/arm.urdf"
 TASK = Walk(duration=0.6)
