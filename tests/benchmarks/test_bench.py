@@ -2,6 +2,8 @@
 
 import time
 
+import pytest
+
 from gsl.core.console import Silent
 from gsl.core.interfaces import SIM
 from gsl.grounding.none import NoGrounding
@@ -11,6 +13,8 @@ from gsl.tasks.walk import Walk
 from gsl.worlds.bullet import BulletWorld
 from gsl_benchmarks.bench import FIGURES, judge, measure_workers
 from gsl_benchmarks.loop import StepClock
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_clock_counts_what_happens_inside_and_nothing_else() -> None:

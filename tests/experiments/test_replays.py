@@ -23,6 +23,8 @@ from gsl_experiments.replay import Replay
 from gsl_experiments.replays_table import Shown
 from gsl_experiments.yielding import compute_closed_strength
 
+pytestmark = pytest.mark.slow
+
 COMMITTED = Path(__file__).parents[2] / "experiments/trials"
 STIFF = "stiffness, legs (joint by joint)"
 SHARES = ("stiffness", "strength", "stiffness_closed", "strength_closed")

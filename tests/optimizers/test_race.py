@@ -20,6 +20,8 @@ from gsl.stages.optimize import Optimize
 from gsl.storage.policies import read_policies
 from gsl.tasks.arm import Arm
 
+pytestmark = pytest.mark.slow
+
 MEAN = partial(objective_values, objective="mean", quantile=0.25)
 CANDIDATES, ROLLOUTS, ERROR = 24, 20, 0.05
 LATITUDE = 3.0  # of what a race expects of the step: 1.5 by the mean, 2.5 by cvar where walks fall

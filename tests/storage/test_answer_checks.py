@@ -19,6 +19,9 @@ from gsl.storage.answer_checks import check_answers
 from gsl.storage.answers import Answered, read_answers
 
 COLLECT = ("collect", *SMALL, "world=robot", "name=one", "recipe.spread=0.02")
+
+pytestmark = pytest.mark.slow
+
 ASKED = "runs/one/collect_real.request"
 AIR = ("collect", "world=robot", "task=excite", "preset=toy", "policy.motions=[steps_large]", "name=one", "workers=1")
 KNEE, SHOULDER = 3, 4

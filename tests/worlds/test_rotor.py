@@ -15,6 +15,8 @@ from gsl.worlds.physics import Physics
 from gsl.worlds.rotor import carry_inertia
 from gsl.worlds.start import resting
 
+pytestmark = pytest.mark.slow
+
 JOINTS = ("LHipPitch", "LKneePitch")  # parallel axes
 SOFT = 1e-3  # N·m/rad: so small a gain makes a target a torque
 
