@@ -33,6 +33,13 @@ def test_causes_that_take_little_of_what_a_calibration_leaves_are_a_part_of_it()
     assert "; what it leaves is possibly caused" in summary(FOUND, [cause(0.46)], shrunk(0.9, 0.5))
 
 
+def test_a_calibration_that_removes_all_leaves_nothing_to_explain_but_its_own_size() -> None:
+    assert summary(FOUND, [cause(0.99)], shrunk(1.0, 0.998)) == (
+        "A calibration of each joint removes 100 % of the gap on held-out data, but by unusual values. "
+        "The gap is caused by load friction of all joints, which leaves usual ones."
+    )
+
+
 def test_a_calibration_that_does_harm_removes_nothing() -> None:
     assert "removes 0 % of the gap" in summary(FOUND, [cause(0.99)], shrunk(0.8, -0.2))
 

@@ -26,6 +26,7 @@ from gsl.diagnosis.verdict.zero_or_load import Droop, find_droops
 from gsl.effects.effect import describe_confusion, effect_class
 
 RANKED = 12  # hypotheses that are listed
+ALL = 0.995  # share of a gap that is written as 100 %
 REPLAYS, TICKS = 6, 400  # pictures of replays, and their ticks at most
 WORDS = {
     "no_gap": "The simulator and the robot agree as far as noise and a per-joint calibration can tell.",
@@ -104,11 +105,11 @@ def summary(
     if shrunk["fraction"] is None:
         return f"The gap is {caused} by {named}."
     gone, alone = shrunk["fraction"], max(0.0, shrunk["calibration_fraction"])
+    removed = f"A calibration of each joint removes {100.0 * alone:.0f} % of the gap on held-out data"
+    if alone >= ALL:  # so causes stand by what they free of the calibration
+        return f"{removed}, but by unusual values. The gap is {caused} by {named}, which leaves usual ones."
     share = "what" if gone - alone >= 0.5 * (1.0 - alone) else "a part of what"
-    return (
-        f"A calibration of each joint removes {100.0 * alone:.0f} % of the gap on held-out data; {share} it leaves is "
-        f"{caused} by {named}; together they remove {100.0 * gone:.0f} %."
-    )
+    return f"{removed}; {share} it leaves is {caused} by {named}; together they remove {100.0 * gone:.0f} %."
 
 
 def doubt(causes: Sequence[Mapping[str, Any]], how: VerdictSettings | None = None) -> str:
