@@ -35,8 +35,8 @@ def test_causes_that_take_little_of_what_a_calibration_leaves_are_a_part_of_it()
 
 def test_a_calibration_that_removes_all_leaves_nothing_to_explain_but_its_own_size() -> None:
     assert summary(FOUND, [cause(0.99)], shrunk(1.0, 0.998)) == (
-        "A calibration of each joint removes 100 % of the gap on held-out data, but by unusual values. "
-        "The gap is caused by load friction of all joints, which makes them less unusual."
+        "A calibration of each joint removes 100 % of the gap on held-out data as well, but costs more, its unusual "
+        "values counted. The gap is caused by load friction of all joints."
     )
 
 

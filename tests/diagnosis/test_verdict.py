@@ -127,6 +127,18 @@ def test_a_spurious_effect_that_is_cheapest_and_fails_hides_no_other() -> None:
     assert replace(tried, rejected=(spurious,)).objection(spurious) == "not significantly better than a calibration"
 
 
+@pytest.mark.parametrize(("share", "stands"), [(0.99, True), (1.01, False)])
+def test_zeros_that_are_off_to_one_side_stand_only_where_they_cost_less(share: float, stands: bool) -> None:
+    shifts = calibration.no_shifts(4)
+    shifts[calibration.ZERO] = 0.02
+    none = replace(NONE, fit=replace(NONE.fit, shifts=shifts, prior_cost=0.0))
+    zero = replace(claim("zero_offset", [0.02], ("offset",)), fit=none.fit, costs=share * none.costs)
+    scopes = {scope: np.ones(4, dtype=bool) for _, scope in zero.places}
+    problem = SimpleNamespace(settings=SearchSettings(), scopes=scopes, simulator=SimpleNamespace(spread=1.0))
+    parted = Search(cast(Any, problem), none).part_singles([zero], 1e9)
+    assert parted == (([], [zero]) if stands else ([], []))
+
+
 @pytest.mark.parametrize(
     ("levels", "is_nothing"), [((0.5, 0.6), True), ((0.5, 1.3), False), ((1.0, 1.0), False), ((0.96, 0.96), True)]
 )

@@ -29,8 +29,9 @@ def moves_zeros_alone(problem: Problem, hypothesis: Hypothesis, other: Hypothesi
 
 
 def explains_zeros(problem: Problem, hypothesis: Hypothesis, other: Hypothesis) -> bool:
-    """Whether the zeros that a hypothesis moves are off to one side where it does not."""
-    return all(_is_aside(problem, other, scope) for _, scope in hypothesis.places - other.places)
+    """Whether the zeros that a hypothesis moves are off to one side where it does not, and it costs less."""
+    more = hypothesis.places - other.places
+    return hypothesis.cost < other.cost and all(_is_aside(problem, other, scope) for _, scope in more)
 
 
 def _wide(problem: Problem) -> list[str]:

@@ -106,8 +106,8 @@ def summary(
         return f"The gap is {caused} by {named}."
     gone, alone = shrunk["fraction"], max(0.0, shrunk["calibration_fraction"])
     removed = f"A calibration of each joint removes {100.0 * alone:.0f} % of the gap on held-out data"
-    if alone >= ALL:  # so causes stand by what they free of the calibration
-        return f"{removed}, but by unusual values. The gap is {caused} by {named}, which makes them less unusual."
+    if alone >= ALL:  # what it leaves cannot be explained
+        return f"{removed} as well, but costs more, its unusual values counted. The gap is {caused} by {named}."
     share = "what" if gone - alone >= 0.5 * (1.0 - alone) else "a part of what"
     return f"{removed}; {share} it leaves is {caused} by {named}; together they remove {100.0 * gone:.0f} %."
 
