@@ -130,7 +130,7 @@ class TrainServo:
         """Return the torque noise that held-out motions leave unexplained [N·m], at every step and constant, (n, 2)."""
         group = neutral(plant, np.random.default_rng(0)).group  # of those that keep their servo, too
         groups = {name: group[: len(exp.joints)] == g for g, name in enumerate(model.groups)}
-        widths = measure_widths(exp, model.on(plant), step=self.sim.step, seed=self.seed, groups=groups)
+        widths = measure_widths(exp, plant, model, step=self.sim.step, seed=self.seed, groups=groups)
         return np.array([widths[name] for name in model.groups])[group]
 
     def _write_world(self, folder: Path, learned: LearnedServo) -> None:

@@ -19,7 +19,7 @@ from gsl.core.plant import Plant
 from gsl.diagnosis.log.log import Log
 from gsl.errors import InputError
 from gsl.models.servo import ServoModel, neutral, with_groups, without_group
-from gsl.training.servo_bench import CHANCE, LIKELY, Duel, ServoBench, cut_windows
+from gsl.training.servo_bench import CHANCE, LIKELY, Duel, ServoBench, cut_windows, is_worse
 from gsl.training.servo_members import ITERATIONS, Member, further
 from gsl.training.servo_network import Progress
 from gsl.training.servo_replays import Replays
@@ -112,9 +112,11 @@ def learn_servo(
             numbers[0] = bench.keep_on_foot(walks, parts.held, numbers[0], on_both)
         networks, ways = zip(*map(network, splits, numbers), strict=True)
         bare = refuse_groups(numbers, networks, 1.0 - CHANCE, WORTH)
+        if walks:  # which a network of motions in the air knows nothing of
+            on_foot = bench.change_on_foot(walks, numbers[0], with_groups(networks[0], numbers[0], bare))
+            bare |= {name for name, change in on_foot.items() if is_worse(change)}
         model = with_groups(networks[0], numbers[0], bare)
-        change = bench.change(Duel(parts.test, start, model))
-        worse = tuple(name for name, share in change.items() if np.quantile(share, CHANCE) > 0.0)
+        worse = tuple(name for name, change in bench.change(Duel(parts.test, start, model)).items() if is_worse(change))
         for name in worse:
             model = without_group(model, name)
         gaps = [bench.by_group(parts.test, servo) for servo in (start, model)]
@@ -124,13 +126,16 @@ def learn_servo(
             new = bench.network(some.take(index), parts.judge, begun, ITERATIONS)[0]
             return with_groups(new, begun, bare | bench.refuse([Duel(parts.held, begun, new)], 1.0 - CHANCE, WORTH))
 
+        def draw_numbers(rng: np.random.Generator) -> ServoModel:
+            return with_groups(bench.numbers_of_some(parts.train, numbers[0], rng, walks), numbers[0], unfit)
+
         others = further(
-            members - 1, lambda rng: bench.numbers_of_some(parts.train, numbers[0], rng), worse, member,
+            members - 1, draw_numbers, worse, member,
             lambda servo: bench.level(parts.test, servo), plant=plant, samples=some.samples, seed=seed,
         )  # fmt: skip
         sizes, way = (len(some), len(parts.judge), len(parts.test)), tuple(ways[0])
-        on_foot = tuple(walks.level(servo) for servo in (start, model)) if walks else None
-        return LearnedServo(model, gaps[0], gaps[1], worse, way, sizes, tuple(others), on_foot, exp.by_record)
+        walked = tuple(walks.level(servo) for servo in (start, model)) if walks else None
+        return LearnedServo(model, gaps[0], gaps[1], worse, way, sizes, tuple(others), walked, exp.by_record)
 
 
 def _check_motion(exp: Log) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Pieces, cut_pieces
 from gsl.diagnosis.log.residual import Comparison
-from gsl.models.servo import ServoModel, with_group
+from gsl.models.servo import ServoModel, with_groups
 from gsl.training.frozen import freeze
 from gsl.training.held_out_change import levels, relative_changes
 from gsl.training.servo_network import Alike, Progress, fit_network
@@ -56,12 +56,16 @@ class ServoBench:
         """Return the start with numbers fitted to the motions of some windows."""
         return fit_numbers(self.replays.plant, self.start, self.make_residual(index), longest=self.longest)
 
-    def numbers_of_some(self, index: np.ndarray, begun: ServoModel, rng: np.random.Generator) -> ServoModel:
-        """Return a model with numbers fitted further, to motions of some windows that are drawn with replacement."""
+    def numbers_of_some(
+        self, index: np.ndarray, begun: ServoModel, rng: np.random.Generator, walks: Walks | None
+    ) -> ServoModel:
+        """Return a model with numbers fitted further, to motions of some windows that are drawn, and to all walks."""
         motion = self.exp.pieces.record[index]
         drawn = rng.choice(np.unique(motion), len(np.unique(motion)))
-        residual = self.make_residual(index[np.isin(motion, drawn)])
-        return fit_numbers(self.replays.plant, begun, residual, longest=self.longest, rounds=1)
+        some = index[np.isin(motion, drawn)]
+        if walks:
+            return self.numbers_with(walks, some, begun)
+        return fit_numbers(self.replays.plant, begun, self.make_residual(some), longest=self.longest, rounds=1)
 
     def numbers_with(self, walks: Walks, index: np.ndarray, begun: ServoModel) -> ServoModel:
         """Return a model with numbers fitted further, to motions in the air and on the ground together."""
@@ -146,14 +150,20 @@ class ServoBench:
             old: What it shall be better than.
             new: The new one.
         """
-        test, air = walks.exp.held_out, self.change(Duel(index, old, new))
+        ground, air = self.change_on_foot(walks, old, new), self.change(Duel(index, old, new))
+        spoken = (name for name in ground if np.quantile(ground[name], LIKELY) >= 0.0 or is_worse(air[name]))
+        return with_groups(new, old, spoken)
+
+    def change_on_foot(self, walks: Walks, old: ServoModel, new: ServoModel) -> dict[str, np.ndarray]:
+        """Return what `change` does, of held-out walks."""
+        test = walks.exp.held_out
         before, after = (walks.residuals(test, model) for model in (old, new))
-        sample = walks.exp.pieces.take(test).samples
-        ground = relative_changes(before, after, sample, self.group, old.groups)
-        for name in ground:
-            if np.quantile(ground[name], LIKELY) >= 0.0 or np.quantile(air[name], CHANCE) > 0.0:
-                new = with_group(new, old, name)
-        return new
+        return relative_changes(before, after, walks.exp.pieces.take(test).samples, self.group, old.groups)
+
+
+def is_worse(change: np.ndarray) -> bool:
+    """Whether a relative change of a cost in bootstraps, shape (SAMPLES,), is significantly above zero."""
+    return bool(np.quantile(change, CHANCE) > 0.0)
 
 
 def cut_windows(exp: Log, index: np.ndarray, lengths: tuple[float, float]) -> Pieces:

@@ -30,9 +30,9 @@ from gsl.diagnosis.log.floor import roughness, third_differences
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Pieces
 from gsl.diagnosis.settings import FloorSettings
-from gsl.diagnosis.simulate.calibration import calibrate, no_shifts
-from gsl.diagnosis.simulate.in_the_air import InTheAir, change
-from gsl.diagnosis.simulate.simulator import simulator_of
+from gsl.diagnosis.simulate.in_the_air import change
+from gsl.models.servo import ServoModel
+from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import Held, Windows
 
 DRAWS = 8  # of white noise: with dozens of windows its answer is known to a few percent
@@ -77,7 +77,7 @@ class Moments(NamedTuple):
 
 
 def measure_widths(
-    log: Log, plant: Plant, shifts: np.ndarray | None = None, *, step: float, seed: int = 0,
+    log: Log, plant: Plant, model: ServoModel | None = None, *, step: float, seed: int = 0,
     groups: Mapping[str, np.ndarray] | None = None,
 ) -> Mapping[str, TorqueWidth]:  # fmt: skip
     """Return the widths by group of joints, `all` for a robot without groups, from a log's held-out windows.
@@ -85,35 +85,38 @@ def measure_widths(
     Args:
         log: In the air.
         plant: The simulator that is to be widened, its effects in it.
-        shifts: Its calibration, shape (7, n_joints); none by default.
+        model: The learned servo on top of it, if there is one.
         step: Physics period [s], that of the world in which the noise will act: white noise has its size there.
         seed: Of the white noise.
         groups: Which joints share their widths, by name, shape (n_joints,) each; those of the robot by default.
     """
-    simulator = simulator_of(log, plant, step)
-    assert isinstance(simulator, InTheAir), "loads act in the chain model"
-    pieces = log.held_out_pieces
-    replay = replays(simulator, pieces, no_shifts(len(log.joints)) if shifts is None else shifts)
+    pieces, physics = log.held_out_pieces, fitting_step(step, log.period)
+    replay = replays(plant, model, pieces, physics, log.period)
     floor = np.maximum(roughness(log.records), max(log.robot.encoder_step / np.sqrt(12.0), 1e-5))
     calm = ~log.comparison.shaking  # the phase of the others is not in a log
     if groups is None:
         names = log.robot.groups or {"all": log.joints}
         groups = {name: np.isin(log.joints, members) for name, members in names.items()}
     quiet = {name: mask & calm for name, mask in groups.items()}
-    steps = pieces.windows.length * round(log.period / simulator.step)
+    steps = pieces.windows.length * round(log.period / physics)
     widths = torque_widths(replay, pieces, floor, quiet, plant, steps, np.random.default_rng(seed))
-    finer = float(np.sqrt(simulator.step / step))  # of white noise that is drawn less often
+    finer = float(np.sqrt(physics / step))  # of white noise that is drawn less often
     return {name: TorqueWidth(finer * each.step, each.constant) for name, each in widths.items()}
 
 
-def replays(simulator: InTheAir, pieces: Pieces, shifts: np.ndarray) -> Replay:
-    """Return replays of some windows under loads, with what is known of each record in the plant."""
-    plant = calibrate(simulator.plant, shifts)
+def replays(plant: Plant, model: ServoModel | None, pieces: Pieces, step: float, period: float) -> Replay:
+    """Return replays of some windows under loads, as the world at this step replays them.
+
+    Args:
+        plant: What the servo stands on; what is known of each record is added to it.
+        model: The learned servo, if there is one.
+        pieces: The windows, in the air.
+        step: Physics period [s].
+        period: Control period [s].
+    """
     assert isinstance(pieces.windows, Windows), "windows in the air"
-    parts = [
-        (Held.of(change(plant, conditions), simulator.step, simulator.period, simulator.accurate), index)
-        for conditions, index in pieces.alike
-    ]
+    plants = [(change(plant, conditions), index) for conditions, index in pieces.alike]
+    parts = [(Held.of(model.on(own) if model else own, step, period), index) for own, index in plants]
     windows, joints = pieces.windows, pieces.real.shape[2]
 
     def replay(load: np.ndarray | None) -> np.ndarray:

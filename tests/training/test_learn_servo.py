@@ -125,9 +125,11 @@ def test_neither_time_nor_threads_change_a_bit(slow: LearnedServo) -> None:
 
 
 def test_nothing_is_learned_where_nothing_differs() -> None:
-    null = learned(prepared({}))
+    null = learn_servo(prepared({}), nominal(ROBOT), STEP, labelled=False, seed=1, threads=1, members=2)
     assert null.before["all"] == pytest.approx(1.0, abs=0.15)
     assert null.after["all"] < null.before["all"] + 0.05
+    for model in (null.model, null.further[0].model):  # a further member learns nothing that the first was refused
+        assert not model.changes("all")
 
 
 def pushed(motion: np.ndarray, time: float) -> np.ndarray:

@@ -29,7 +29,7 @@ def motion(seed: int, length: int = 200) -> np.ndarray:
     return STANCE + 0.15 * (np.sin(2.0 * np.pi * pace * time + phase) - np.sin(phase))
 
 
-def log(effects: dict[str, Any], count: int = 16) -> Log:
+def log(effects: dict[str, Any], count: int = 16, about: dict[str, Any] | None = None) -> Log:
     """Motions in the air, every one with noise of its own."""
     world, episodes = held({**effects, **NOISE}), []
     env = world.make()
@@ -43,7 +43,7 @@ def log(effects: dict[str, Any], count: int = 16) -> Log:
     metadata = {
         "robot": "nao",
         "episodes": [{"policy": f"swing_{index}"} for index in range(count)],
-        "world": {"step": 0.002},
+        **({"world": {"step": 0.002}} if about is None else about),
     }
     return cut_log(Batch(tuple(episodes), nao().controlled, PERIOD, metadata), nao())
 
@@ -76,6 +76,11 @@ def test_white_torque_gives_its_width_back_though_it_makes_the_log_rough_itself(
 def test_both_at_once_are_told_apart() -> None:
     seen = widths({"torque_noise": {"step": 0.5, "constant": 0.1}})
     assert seen["legs"] == (pytest.approx(0.5, rel=0.1), pytest.approx(0.1, rel=0.2))
+
+
+def test_a_log_that_says_nothing_of_its_physics_is_replayed_as_the_world_moves() -> None:
+    """In which the noise will act: an error of its time step is in the learned servo already and is no noise."""
+    assert set(measure_widths(log({}, about={}), nominal(nao()), step=0.002).values()) == {(0.0, 0.0)}
 
 
 def test_at_the_floor_there_is_none_and_a_wrong_gain_takes_some() -> None:
