@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from gsl.core.trajectory import Batch, Trajectory
 
 OTHER_COMMANDS = ("velocity_command", "torque_command")  # groups of columns, in the order of `read_other_commands`
 GAINS = {"kp_command": "kp", "kd_command": "kd"}  # group of columns -> gain of the servo
+GAIN_EFFECT = "servo_gain"  # by which a simulator gets a log's gains
+LOGGED_GAINS = "logged_gains"  # what metrics call the entries of that effect
 SAME = 1e-6  # relative: a gain that differs less is the same, as files round
 
 
@@ -42,6 +45,11 @@ def find_varying_gains(sensors: Sequence[Mapping[str, np.ndarray]], joints: Sequ
 def read_gains(sensors: Sequence[Mapping[str, np.ndarray]], column: str) -> np.ndarray:
     """Return all values of a column of gains; the last row of a trajectory has no command."""
     return np.concatenate([np.zeros(0), *(columns[column][:-1] for columns in sensors if column in columns)])
+
+
+def gains_of(metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the effects by which a log's gains came to the simulator of an artifact, from its metrics."""
+    return {GAIN_EFFECT: metrics[LOGGED_GAINS]} if LOGGED_GAINS in metrics else {}
 
 
 def read_other_commands(episode: Trajectory, robot: Robot, *, gains: bool = False) -> np.ndarray:

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from gsl.effects.effect import build
+from gsl.core.other_commands import gains_of
+from gsl.effects.effect import build, together
 from gsl.errors import ArtifactError
 from gsl.grounding.draws import UncertainCause
 from gsl.storage.artifact import Artifact
@@ -28,7 +29,7 @@ class Diagnosis:
         summary: In a sentence.
         robot: That was simulated.
         simulated: The `effects:` of the simulator as it was.
-        effects: What it lacks, its calibration included.
+        effects: What it lacks, the log's own gains and its calibration included.
         before, after: The held-out gap without and with them, in noise floors; None where nobody measured.
         uncertain: Causes with their probabilities and intervals, as far as it tells them.
     """
@@ -81,7 +82,7 @@ def _read(artifact: Artifact) -> Diagnosis:
         summary=report["summary"],
         robot=sim["robot"],
         simulated=sim["effects"],
-        effects=report["effects"],
+        effects=together([gains_of(artifact.metrics), report["effects"]]),
         before=gap["before"],
         after=gap["after"],
         uncertain=tuple(uncertain_causes(report)),

@@ -15,13 +15,17 @@ import numpy as np
 
 from gsl.core.interfaces import Grounding, GroundingRun, Prepared, World
 from gsl.core.layout import Layout
+from gsl.core.other_commands import gains_of
 from gsl.core.setting import component, setting
+from gsl.effects.effect import together
 from gsl.errors import ConfigError
 from gsl.grounding.ane import ActionNoise
 from gsl.grounding.none import NoGrounding
 from gsl.grounding.torque_noise import with_torque_noise
 from gsl.models.servo import other_base
 from gsl.models.servo_file import MAKER, read_members, read_servo
+from gsl.storage import manifest
+from gsl.storage.artifact import Artifact
 from gsl.storage.references import resolve
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.ensemble import EnsembleWorld
@@ -84,7 +88,12 @@ class LearnedServo:
         checked = self.check(world)
         if not self.servo:
             raise ConfigError("grounding.servo", "is missing; name a run of gsl train-servo")
-        if other := other_base(checked.plant, read_servo(self.servo)):
+        model = read_servo(self.servo)
+        if other_base(checked.plant, model):  # one of a log that has its gains stands on these
+            place = resolve(self.servo, kind=MAKER)
+            gains = gains_of(Artifact(place, manifest.read(place)).metrics)
+            checked = replace(checked, effects=together([checked.effects, gains]))
+        if other := other_base(checked.plant, model):
             raise ConfigError("grounding.servo", f"was learned on top of another servo: {other}", given=self.servo)
         first = self.shaken(replace(checked, servo=self.servo))
         if not self.ensemble:

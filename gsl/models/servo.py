@@ -20,6 +20,7 @@ LOSSES = ("load_friction", "duty_loss")  # and so are these, in replays alone: g
 NUMBERS = (*FACTORS, *SUMS, *LOSSES)
 SLIDES = "slides"  # group of the motors that slide, where others turn
 UNLIMITED = 1e9  # in a checkpoint, which holds finite numbers alone
+UNDAMPED = 0.02  # damping a stiffness [s] of a servo without, whose unit of friction would be none: a NAO's
 LEAST_INERTIA = 0.2  # share of the rotor's inertia that is left: below it the joint is not stable at 2 ms
 
 
@@ -134,9 +135,10 @@ def units(plant: Plant) -> dict[str, np.ndarray]:
     About how far robots of one class are from their data sheets: see the ranges of the effects.
     """
     each, servo = np.ones(len(plant.servo.kp)), plant.servo
+    damping = np.where(servo.kd > 0.0, servo.kd, UNDAMPED * servo.kp)
     return {
         "kp": 0.2 * each, "kd": 0.3 * each, "limit": 0.1 * each, "delay": 0.01 * each, "coulomb": 0.05 * servo.limit,
-        "viscous": 0.1 * servo.kd, "deadband": 0.003 * each, "armature": 0.3 * (servo.armature + 1e-3 * servo.kd),
+        "viscous": 0.1 * damping, "deadband": 0.003 * each, "armature": 0.3 * (servo.armature + 1e-3 * servo.kd),
         "offset": 0.005 * each, "load_friction": 0.1 * each, "duty_loss": 0.1 * each,
     }  # fmt: skip
 

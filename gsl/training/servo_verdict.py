@@ -49,6 +49,9 @@ def remarks(metrics: Mapping[str, Any]) -> list[str]:
     if not metrics["whole_motions"]:
         remarks.append("the log is one motion, of which parts are held out: the figures are optimistic")
     for name, group in metrics["groups"].items():
+        if group["floors_after"] > FARTHEST >= after:
+            floors = f"{group['floors_after']:.1f} noise floors"
+            remarks.append(f"{name} are {floors} from the log, more than {FARTHEST:g}: their loads are not the robot's")
         if not group["learned"]:
             remarks.append(f"{name} keep their servo: nothing that was learned brought held-out motions nearer")
     return remarks

@@ -14,17 +14,17 @@ import yaml
 from commands import done
 from swinging_arm import FEW, NOISE, PERIOD, arm, motions
 
-from gsl.core.other_commands import read_other_commands
+from gsl.core.other_commands import gains_of, read_other_commands
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnose
-from gsl.diagnosis.log.gains import with_logged_gains
+from gsl.diagnosis.log.gains import added_gains, with_logged_gains
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import cut_pieces
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.simulator import compare_with_bullet, simulator_of
 from gsl.diagnosis.verdict.self_test import relog
-from gsl.effects.effect import apply_all, build
+from gsl.effects.effect import apply_all, build, together
 from gsl.errors import GslError
 from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.held import Held
@@ -134,6 +134,11 @@ def test_the_servos_get_the_gains_of_the_log(gains: tuple[float, float]) -> None
     sim = with_logged_gains(SIM, logged, "log")
     np.testing.assert_allclose([sim.plant.servo.kp[0], sim.plant.servo.kd[0]], gains)
     assert with_logged_gains(sim, logged, "log") is sim
+    added = added_gains(SIM, sim)
+    assert replace(SIM, effects=gains_of(added)).plant.servo.kp == sim.plant.servo.kp
+    assert added_gains(SIM, SIM) == {} and gains_of({}) == {}
+    diagnosed = replace(sim, effects=together([sim.effects, {"servo_gain": [{"kp": 0.7, "joints": "joint"}]}]))
+    assert with_logged_gains(diagnosed, logged, "log") is diagnosed  # its fault is no gain that the log commands
 
 
 def test_a_log_without_gains_or_with_those_of_the_simulator_changes_nothing() -> None:

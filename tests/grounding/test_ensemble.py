@@ -18,7 +18,9 @@ from scipy import stats
 
 from gsl.core.checkpoint import read_checkpoint
 from gsl.core.described import describe
+from gsl.core.other_commands import LOGGED_GAINS
 from gsl.core.plant import Plant
+from gsl.effects.effect import together
 from gsl.errors import ConfigError
 from gsl.grounding.diagnosis_file import read_diagnosis, uncertain_causes
 from gsl.grounding.draws import DRAWS, UncertainCause, around, drawings, hypercube, within
@@ -74,6 +76,7 @@ class Servo:
 
     members: int
     effects: Mapping[str, Any] = field(default_factory=dict)
+    more: Mapping[str, Any] = field(default_factory=dict)
     kind: ClassVar[str] = "train_servo"
 
     def parents(self) -> Mapping[str, Path]:
@@ -82,7 +85,7 @@ class Servo:
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         plant = replace(NAO, effects=self.effects).plant
         write_model(folder, ServoMembers(tuple(softer(k, plant) for k in range(self.members))))
-        return {**FLOORS, "members": [0.5] * self.members}
+        return {**FLOORS, "members": [0.5] * self.members, **self.more}
 
 
 @dataclass(frozen=True)
@@ -90,6 +93,7 @@ class Found:
     """Writes a diagnosis without a log."""
 
     sim: BulletWorld = NAO
+    more: Mapping[str, Any] = field(default_factory=dict)
     kind: ClassVar[str] = "diagnose"
 
     def parents(self) -> Mapping[str, Path]:
@@ -97,7 +101,7 @@ class Found:
 
     def run(self, folder: Path, console: Any) -> Mapping[str, Any]:
         (folder / "report.json").write_text(json.dumps(REPORT))
-        return {}
+        return self.more
 
 
 def made(stage: Any, out: Path) -> str:
@@ -237,6 +241,18 @@ def test_draws_of_a_report_leave_its_calibration(folder: Path) -> None:
         assert member.effects["servo_gain"][-2:] == CALIBRATION
     assert replace(grounding, draws=False).draw(world, diagnosis) is world
     assert not [*uncertain_causes({"causes": [{"effect": "backlash"}], "effects": {"backlash": [{"width": 0.01}]}})]
+
+
+def test_a_log_that_had_gains_of_its_own_hands_them_over(tmp_path: Path) -> None:
+    """A servo and a diagnosis stand on the servos that the log commanded; both groundings bring these along."""
+    gains = {"servo_gain": [{"kp": 0.4, "joints": "legs"}]}
+    logged = {LOGGED_GAINS: gains["servo_gain"]}
+    servo = LearnedServo(servo=made(Servo(1, gains, logged), tmp_path / "runs/log/train_servo"))
+    found = read_diagnosis(made(Found(more=logged), tmp_path / "runs/log/diagnose"), "diagnose")
+    commanded = replace(NAO, effects=gains)
+    np.testing.assert_array_equal(servo.switch_on(NAO).plant.servo.kp, servo.switch_on(commanded).plant.servo.kp)
+    whole = replace(NAO, effects=together([gains, EFFECTS]))
+    np.testing.assert_allclose(switch_on(NAO, found).plant.servo.kp, whole.plant.servo.kp)
 
 
 def test_drawn_effects_and_members_of_a_servo_go_together(folder: Path, tmp_path: Path) -> None:
