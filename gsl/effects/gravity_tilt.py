@@ -1,4 +1,4 @@
-"""Gravity is turned: first about the world's x axis by `roll`, then about its y axis by `pitch`."""
+"""Gravity is turned about the world's x axis by `roll`, then about y by `pitch`."""
 
 from __future__ import annotations
 

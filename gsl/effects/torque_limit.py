@@ -1,4 +1,4 @@
-"""The torque limit differs from the nominal one by a factor; the speed line stays."""
+"""The torque limit differs by a factor; the speed line stays."""
 
 from __future__ import annotations
 

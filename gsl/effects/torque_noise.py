@@ -1,4 +1,4 @@
-"""Gaussian noise on the torque of every motor: new at each physics step, and a constant drawn once an episode."""
+"""Gaussian noise on every torque: new at each physics step, and a constant for an episode."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ class TorqueNoise:
     `step` · sqrt(2 ms / period).
 
     Signature: repeats of one command differ by constant / kp at rest, alike all through an episode, and tremble.
-    Confused with action noise, which a stiff joint follows as well as a soft one, and with load friction and masses,
-    which are the same in every episode; repeats under another gain separate them.
+    Confused with action noise, load friction and masses; a stiff joint follows action noise as well as a soft one,
+    friction and masses are the same in every episode, and repeats under another gain separate them.
     """
 
     kind: ClassVar[str] = "servo"
