@@ -16,9 +16,8 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class ActionNoise:
     """Targets that arrive a little wrong; also what makes a simulator demand margin of a policy.
 
-    Signature: repeats of one command drift apart, the more the longer they run; at rest the log is smooth. Confused
-    with encoder noise and uneven ground; encoder noise is white and does not grow, a ground needs contact, and repeats
-    in the air separate them.
+    Signature: repeats of one command drift apart, the more the longer they run. Confused with encoder noise, which is
+    white and does not grow, and with an uneven ground, which needs contact; repeats in the air separate them.
     """
 
     kind: ClassVar[str] = "command"

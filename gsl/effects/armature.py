@@ -16,7 +16,7 @@ class Armature:
     """A heavier rotor, or another gear ratio.
 
     Signature: slower to set off and more overshoot; nothing in slow motion. Confused with a torque limit in large
-    steps, kd and a payload; a payload also weighs; steps of several sizes, and the same with a weight, separate them.
+    steps, kd, and a payload, which also weighs; steps of several sizes, and the same with a weight, separate them.
     """
 
     kind: ClassVar[str] = "body"

@@ -19,8 +19,8 @@ class CentreOfMass:
     """Shifts a link's centre of mass, in the link's axes; its inertia about it stays.
 
     Signature: a torque that follows the pose and is zero where gravity passes through the joint. Confused with a link's
-    mass, zero offsets and gravity tilt; a mass also resists acceleration, zero offsets do not depend on the pose, all
-    joints feel a tilt, and a ladder of static poses and a fast swing separate them.
+    mass, which also resists acceleration, zero offsets, which do not depend on the pose, and gravity tilt, which all
+    joints feel; a ladder of static poses and a fast swing separate them.
     """
 
     kind: ClassVar[str] = "body"

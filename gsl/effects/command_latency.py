@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class CommandLatency:
     """Time between issuing a command and the servo's seeing it.
 
-    Signature: a pure time shift: an error in proportion to speed, none at rest. Confused with target smoothing, a
-    sensor delay and, in slow motion, viscous friction and a higher kd; steps of several sizes separate them: the onset
-    is late, the slope as ever; a sensor delay shifts the log as much in open loop, and a higher kp makes that one ring.
+    Signature: a pure time shift: an error in proportion to speed, none at rest. Confused with target smoothing, viscous
+    friction and a higher kd in slow motion; steps of several sizes separate them: the onset is late, the slope as ever.
+    Also with a sensor delay, which in open loop shifts the log as much; a higher kp makes that one ring.
     """
 
     kind: ClassVar[str] = "command"

@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class DutyLoss:
     """What a driver stage and a saturating motor lose: torque = u (1 - coefficient |u| / limit).
 
-    Signature: under load the error grows faster than the load; large steps are slower, small ones are not. Confused
-    with a torque limit and a low kp; a torque limit cuts off at one torque only, a low kp's error is in proportion to
-    the load, and a ladder of loads separates them.
+    Signature: under load the error grows faster than the load; large steps are slower. Confused with a torque limit,
+    which cuts off at one torque only, and a low kp, whose error is in proportion to the load; a ladder of loads
+    separates them.
     """
 
     kind: ClassVar[str] = "servo"

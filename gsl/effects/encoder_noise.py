@@ -16,8 +16,8 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class EncoderNoise:
     """Gaussian noise on what the log and the policy see of the positions.
 
-    Signature: a white residual that is the same at every horizon. Confused with action noise and quantisation; action
-    noise grows with the horizon, and repeats of one command, and rest, measure it.
+    Signature: a white residual that is the same at every horizon. Confused with action noise, which grows with the
+    horizon, and quantisation; repeats of one command, and rest, measure it.
     """
 
     kind: ClassVar[str] = "sensor"

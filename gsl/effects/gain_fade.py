@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class GainFade:
     """Motors that get hot, and firmware that spares them.
 
-    Signature: the same pose under the same load is held worse and worse until the episode ends. Confused with a low kp
-    and a drifting zero; a low kp is there from the start, a drifting zero does not depend on the load, and returning to
-    one pose again and again, and a rest, separate them.
+    Signature: the same pose under the same load is held worse and worse until the episode ends. Confused with a low kp,
+    which is there from the start, and a drifting zero, which does not depend on the load; returning to one pose again
+    and again, and a rest, separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -13,9 +13,9 @@ from gsl.core.setting import component, setting
 class GroundCompliance:
     """Carpet, turf or foam. The spring is that of one contact point; a flat sole rests on four.
 
-    Signature: the robot stands lower by weight / (stiffness x points); touchdown is softer, with a bounce where damping
-    is low. Confused with ground friction and uneven ground; stamping on one spot separates them: the force rises
-    slowly, at every place, and nothing slips.
+    Signature: the robot stands lower by weight / (stiffness x points); touchdown is softer. Confused with ground
+    friction and uneven ground; stamping on one spot separates them: the force rises slowly, at every place, and nothing
+    slips.
     """
 
     kind: ClassVar[str] = "contact"

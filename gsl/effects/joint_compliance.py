@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class JointCompliance:
     """Gear, horn and bracket that give way.
 
-    Signature: encoder at the motor: the log shows next to nothing, the limb hangs lower by load · compliance; encoder
-    at the output: a resonance, quick motion arrives larger than commanded. Confused with a low kp, backlash and kd; a
-    sweep through the resonance, or a load on a joint that something else measures, separates them.
+    Signature: the limb hangs lower by load · compliance, unseen by an encoder at the motor; an encoder at the output
+    shows a resonance. Confused with a low kp, backlash and kd; a sweep through the resonance, or a load on a joint that
+    something else measures, separates them.
     """
 
     kind: ClassVar[str] = "body"

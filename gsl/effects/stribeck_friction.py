@@ -16,8 +16,8 @@ class StribeckFriction:
     """Stiction: what holds a joint at rest and lets go once it moves.
 
     Signature: it sticks and then jumps at the start of a motion, slow ramps become staircases. Confused with Coulomb
-    friction, backlash and quantisation; Coulomb friction lags at every speed, and ramps of 0.01 to 0.1 rad/s beside
-    fast ones separate them.
+    friction, which lags at every speed, and with backlash and quantisation; ramps of 0.01 to 0.1 rad/s beside fast ones
+    separate them.
     """
 
     kind: ClassVar[str] = "servo"

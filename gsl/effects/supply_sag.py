@@ -15,8 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class SupplySag:
     """Battery, cables and connectors have a resistance: V = V0 - resistance · sum of |torque| / torque constant.
 
-    Signature: weak and slow motors, but only while many of them work. Confused with a torque limit and load-dependent
-    friction; moving one joint and then all of them, or a log of the voltage, separates them.
+    Signature: weak and slow motors, but only while many of them work. Confused with a torque limit, which does not care
+    what the others do, and load-dependent friction; moving one joint and then all of them, or a log of the voltage,
+    separates them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -16,8 +16,8 @@ class TargetSmoothing:
     """A filter in the servo's firmware, or a profile that resembles one.
 
     Signature: a step sets off at once but rounded; quick motion arrives smaller and later. Confused with a command
-    latency and, in slow motion, a higher kd and viscous friction; the onset of a step separates it from a latency,
-    steps of several sizes from a torque limit, another load from the servo's own dynamics.
+    latency, a higher kd and viscous friction, since a slow motion is merely late; the onset of a step separates it from
+    a latency, steps of several sizes from a torque limit, another load from the servo's own dynamics.
     """
 
     kind: ClassVar[str] = "command"

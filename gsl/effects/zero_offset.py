@@ -15,10 +15,10 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class ZeroOffset:
     """A joint that was calibrated wrongly, in the servo: it stands elsewhere than commanded.
 
-    Signature: the same bias at every speed, load and pose; on the ground the base leans. Confused with a sensor bias,
-    gravity tilt and masses; in the air a bias is alike by nature (the log shows both, but only this one moves the
-    robot), on the ground the base and the feet separate them; poses in which gravity pulls the other way separate the
-    others.
+    Signature: the same bias at every speed, load and pose; on the ground the base leans. Confused with a sensor bias:
+    in the air the two are alike by nature (the log shows both, but only this one moves the robot), on the ground the
+    base and the feet separate them. Also with gravity tilt and masses: poses in which gravity pulls the other way
+    separate them.
     """
 
     kind: ClassVar[str] = "body"
