@@ -20,14 +20,20 @@ PLACE = re.compile(r"(<!-- table (\w+) -->\n).*?(?=<!-- end -->)", re.DOTALL)
 
 def effects() -> Iterator[Sequence[str]]:
     """Yield the effects of the library in the order in which they are applied."""
-    yield "effect", "parameters, documented range", "what it is", "signature"
+    yield (
+        "effect",
+        "parameters, documented range",
+        "what it is",
+        "signature",
+        "confused with, and separated by",
+    )
     classes = {name: effect_class(name) for name in names()}
     for name, kind in sorted(classes.items(), key=lambda one: (KINDS.index(one[1].kind), one[1].rank)):
         told = " ".join((kind.__doc__ or "").split()).partition("Signature: ")[2]
-        signature = told.partition(" Confused with ")[0]
+        signature, _, confused = told.partition(" Confused with ")
         parameters = [describe(each) for each in settings_of(kind).values() if each.name != "joints"]
         meaning = (importlib.import_module(kind.__module__).__doc__ or "").strip().rstrip(".")
-        yield f"`{name}`", "; ".join(parameters), meaning, signature.rstrip(".")
+        yield f"`{name}`", "; ".join(parameters), meaning, signature.rstrip("."), confused.rstrip(".")
 
 
 def describe(parameter: Setting) -> str:

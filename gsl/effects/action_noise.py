@@ -1,4 +1,4 @@
-"""Gaussian noise on every target, new at each control step."""
+"""Gaussian noise on the target of every motor, drawn anew at each control step."""
 
 from __future__ import annotations
 
@@ -16,8 +16,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class ActionNoise:
     """Targets that arrive a little wrong; also what makes a simulator demand margin of a policy.
 
-    Signature: repeats of one command drift apart, the more the longer they run. Confused with encoder noise, which is
-    white and does not grow, and with an uneven ground, which needs contact; repeats in the air separate them.
+    Signature: repeats of one command drift apart, the more the longer they run; what is measured at rest is smooth from
+    one step to the next. Confused with encoder noise, which is white and does not grow, and with an uneven ground,
+    which needs contact; repeats in the air separate them.
     """
 
     kind: ClassVar[str] = "command"

@@ -1,4 +1,4 @@
-"""More rotor inertia, as the joint's output feels it."""
+"""More rotor inertia, as the joint's output feels it, than the nominal."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class Armature:
     """A heavier rotor, or another gear ratio.
 
-    Signature: slower to set off and more overshoot; nothing in slow motion. Confused with a torque limit in large
-    steps, kd, and a payload, which also weighs; steps of several sizes, and the same with a weight, separate them.
+    Signature: slower to set off and more overshoot; nothing at rest and in slow motion. Confused with a torque limit in
+    large steps, kd, and a payload, which also weighs; steps of several sizes, and the same with a weight, separate
+    them.
     """
 
     kind: ClassVar[str] = "body"

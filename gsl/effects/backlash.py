@@ -1,4 +1,4 @@
-"""Play between motor and output; teeth push only when the gap is closed."""
+"""Play between motor and output: two masses, and teeth that push only when the gap is closed."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class Backlash:
     """Free play of the gear; the encoder sits at the output.
 
-    Signature: a hysteresis of constant width where the load reverses, lost motion and then a jerk. Confused with
-    Coulomb friction, a dead band and joint compliance; a slow triangle under a load bias closes the gap: the backlash
-    vanishes, friction, dead band and spring stay.
+    Signature: a hysteresis of constant width where the load reverses, lost motion and then a jerk, limit cycles near 13
+    Hz at rest. Confused with Coulomb friction, a dead band and joint compliance; a slow triangle under a load bias
+    closes the gap: the backlash vanishes, friction, dead band and spring stay.
     """
 
     kind: ClassVar[str] = "servo"

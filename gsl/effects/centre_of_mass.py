@@ -1,4 +1,4 @@
-"""The centre of mass of a link lies elsewhere."""
+"""The centre of mass of a link lies elsewhere than the model says."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _SOURCE = "estimate: 2 cm"
 class CentreOfMass:
     """Shifts a link's centre of mass, in the link's axes; its inertia about it stays.
 
-    Signature: a torque that follows the pose and is zero where gravity passes through the joint. Confused with a link's
-    mass, which also resists acceleration, zero offsets, which do not depend on the pose, and gravity tilt, which all
-    joints feel; a ladder of static poses and a fast swing separate them.
+    Signature: a torque that follows the pose and is zero where gravity passes through the joint; on the ground the
+    robot leans. Confused with a link's mass, which also resists acceleration, zero offsets, which do not depend on the
+    pose, and gravity tilt, which all joints feel; a ladder of static poses and a fast swing separate them.
     """
 
     kind: ClassVar[str] = "body"

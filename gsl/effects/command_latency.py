@@ -1,4 +1,4 @@
-"""The target arrives later: target(t) = command(t - delay)."""
+"""The target arrives later: target(t) = command(t - delay), continuous in the delay."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class CommandLatency:
     """Time between issuing a command and the servo's seeing it.
 
-    Signature: a pure time shift: an error in proportion to speed, none at rest. Confused with target smoothing, viscous
-    friction and a higher kd in slow motion; steps of several sizes separate them: the onset is late, the slope as ever.
-    Also with a sensor delay, which in open loop shifts the log as much; a higher kp makes that one ring.
+    Signature: a pure time shift, error in proportion to speed, zero at rest. Confused with target smoothing, viscous
+    friction and a higher kd in slow motion; steps of several sizes separate them: the onset is late, the slope as
+    ever. Also with a sensor delay, which in open loop shifts the log as much; a higher kp makes that one ring.
     """
 
     kind: ClassVar[str] = "command"

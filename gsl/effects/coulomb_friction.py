@@ -1,4 +1,4 @@
-"""Dry friction, -torque sign(dq/dt); it also holds a joint at rest."""
+"""Dry friction at the joint: -torque sign(dq/dt), added to the nominal; it also holds the joint at rest."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class CoulombFriction:
     """Friction of constant size.
 
-    Signature: a lag of constant size, flat tops at reversals, static errors within +-torque / kp. Confused with
-    backlash, a dead band, stiction and load-dependent friction; triangles at three speeds (the error does not depend on
-    speed) and under two loads separate them.
+    Signature: a lag of constant size with the sign of the speed, flat tops at reversals, a band of static errors of
+    +-torque / kp. Confused with backlash, a dead band, stiction and load-dependent friction; triangles at three speeds
+    (the error does not depend on speed) and under two loads separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -1,4 +1,4 @@
-"""The servo ignores small errors, and of larger ones the same amount."""
+"""The servo ignores small errors, and of larger ones the same amount: a dead band without a jump."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class Deadband:
     """A dead zone in the servo's control law.
 
-    Signature: an unloaded joint stops anywhere within +-width of its target, smaller steps move nothing. Confused with
-    backlash, dry friction and a low kp; a ladder of static loads separates it: the error grows by load / kp from width
-    on, whereas friction's depends on where the joint came from and kp's goes through zero.
+    Signature: a joint without load stops anywhere within +-width of its target, steps smaller than that move nothing,
+    and a loaded joint hangs lower by width. Confused with backlash, dry friction and a low kp; a ladder of static loads
+    separates it: the error grows by load / kp from width on, whereas friction's depends on where the joint came from
+    and kp's goes through zero.
     """
 
     kind: ClassVar[str] = "command"

@@ -1,4 +1,4 @@
-"""A share of the torque is lost, in proportion to the duty."""
+"""A share of the driving torque is lost, in proportion to the duty: of more, more."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class DutyLoss:
     """What a driver stage and a saturating motor lose: torque = u (1 - coefficient |u| / limit).
 
-    Signature: under load the error grows faster than the load; large steps are slower. Confused with a torque limit,
-    which cuts off at one torque only, and a low kp, whose error is in proportion to the load; a ladder of loads
-    separates them.
+    Signature: under load the error grows faster than the load, large steps are slower, small ones are not. Confused
+    with a torque limit, which cuts off at one torque only, and a low kp, whose error is in proportion to the load; a
+    ladder of loads separates them.
     """
 
     kind: ClassVar[str] = "servo"

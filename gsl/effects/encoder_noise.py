@@ -1,4 +1,4 @@
-"""White noise on the logged positions; the servo does not see it."""
+"""White noise on the logged joint positions; the servo does not see it."""
 
 from __future__ import annotations
 

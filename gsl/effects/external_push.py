@@ -1,4 +1,4 @@
-"""A force on a link's centre of mass, for some time of every episode."""
+"""A force from outside on a link's centre of mass, for some time of every episode."""
 
 from __future__ import annotations
 
@@ -18,8 +18,9 @@ _SOURCE = "estimate: a fifth of the weight; π0 falls of 10 N for 0.2 s"
 class ExternalPush:
     """Somebody pushes the robot, or a cable pulls at it.
 
-    Signature: a deviation that no command explains, isolated in time. Confused with a gravity tilt, if it lasts, and
-    with nothing, if it is short; the same episode without it separates them.
+    Signature: a deviation that no command explains, isolated in time, in all joints between the link and the ground.
+    Confused with a gravity tilt, if it lasts, and with nothing, if it is short; the same episode without it separates
+    them.
     """
 
     kind: ClassVar[str] = "environment"

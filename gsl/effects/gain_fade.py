@@ -1,4 +1,4 @@
-"""The proportional gain fades in an episode: kp (1 - rate · t)."""
+"""The proportional gain fades in the course of an episode: kp (1 - rate · t)."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class GainFade:
     """Motors that get hot, and firmware that spares them.
 
-    Signature: the same pose under the same load is held worse and worse until the episode ends. Confused with a low kp,
-    which is there from the start, and a drifting zero, which does not depend on the load; returning to one pose again
-    and again, and a rest, separate them.
+    Signature: the same pose under the same load is held worse and worse; the error grows with time and is back at the
+    next episode. Confused with a low kp, which is there from the start, and a drifting zero, which does not depend on
+    the load; returning to one pose again and again, and a rest, separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -1,4 +1,4 @@
-"""Gravity is turned about the world's x axis by `roll`, then about y by `pitch`."""
+"""Gravity is turned: first about the world's x axis by `roll`, then about its y axis by `pitch`."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ _SOURCE = "estimate: a slope of 15 %"
 class GravityTilt:
     """A slope, or a stand that is not upright; with a positive pitch the world's x axis points uphill.
 
-    Signature: the load of every joint changes as one rotation has it; the robot leans downhill. Confused with zero
-    offsets and centres of mass; turning the robot by half a turn separates them: the effect of a slope turns round,
-    theirs does not.
+    Signature: the load of every joint changes as one rotation has it; on the ground the robot leans and drifts
+    downhill. Confused with zero offsets and centres of mass; turning the robot by half a turn separates them: the
+    effect of a slope turns round, theirs does not.
     """
 
     kind: ClassVar[str] = "environment"

@@ -1,4 +1,4 @@
-"""Every point of contact with the ground is a spring with a damper."""
+"""The ground gives way: every point of contact is a spring with a damper."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from gsl.core.setting import component, setting
 class GroundCompliance:
     """Carpet, turf or foam. The spring is that of one contact point; a flat sole rests on four.
 
-    Signature: the robot stands lower by weight / (stiffness x points); touchdown is softer. Confused with ground
-    friction and uneven ground; stamping on one spot separates them: the force rises slowly, at every place, and nothing
-    slips.
+    Signature: standing, the robot is lower by weight / (stiffness x points); touchdown is softer and load passes from
+    one foot to the other later, with a bounce where damping is low; nothing in the air. Confused with ground friction
+    and uneven ground; stamping on one spot separates them: the force rises slowly, at every place, and nothing slips.
     """
 
     kind: ClassVar[str] = "contact"

@@ -1,4 +1,4 @@
-"""Another friction coefficient between sole and ground."""
+"""The friction coefficient between sole and ground is another one."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from gsl.core.setting import component, setting
 class GroundFriction:
     """Coefficient of friction under the feet.
 
-    Signature: the stance foot slips, yaw drifts; nothing while standing. Confused with ground compliance and uneven
-    ground; a ladder of push-offs separates them: it slips beyond one size.
+    Signature: slip of the stance foot, drift in yaw; nothing in the air and nothing while standing. Confused with
+    ground compliance and uneven ground; a ladder of push-offs separates them: it slips beyond one size.
     """
 
     kind: ClassVar[str] = "contact"

@@ -1,4 +1,4 @@
-"""A spring in series between motor and output."""
+"""A spring in series between motor and output: two masses."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class JointCompliance:
     """Gear, horn and bracket that give way.
 
-    Signature: the limb hangs lower by load · compliance, unseen by an encoder at the motor; an encoder at the output
-    shows a resonance. Confused with a low kp, backlash and kd; a sweep through the resonance, or a load on a joint that
-    something else measures, separates them.
+    Signature: with the encoder on the motor's side the log shows next to nothing while the limb hangs lower by load ·
+    compliance; with the encoder at the output the servo makes up for the load, and a resonance is left: quick motion
+    arrives larger than commanded, and with high gains it never comes to rest. Confused with a low kp, backlash and
+    kd; a sweep through the resonance, or a load on a joint that something else measures, separates them.
     """
 
     kind: ClassVar[str] = "body"

@@ -16,8 +16,8 @@ from gsl.errors import ConfigError
 class JointLimit:
     """Cables, covers and worn stops that end a motion earlier than the model says.
 
-    Signature: clipped at one angle, however slow and with whatever load. Confused with a torque limit, which clips
-    large loads at any angle; approaching the stop slowly, from poses with little load, separates them.
+    Signature: clipped on one side, at one angle, however slow and with whatever load. Confused with a torque limit,
+    which clips large loads at any angle; approaching the stop slowly, from poses with little load, separates them.
     """
 
     kind: ClassVar[str] = "body"

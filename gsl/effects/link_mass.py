@@ -1,4 +1,4 @@
-"""A link has more or less mass, its inertia in proportion."""
+"""A link carries more (or less) mass at its centre of mass, its inertia growing in proportion."""
 
 from __future__ import annotations
 

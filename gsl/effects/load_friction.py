@@ -1,4 +1,4 @@
-"""Dry friction by load: coefficient |motor torque - external torque|."""
+"""Dry friction in proportion to the load in the gear: coefficient |motor torque - external torque|, added."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class LoadFriction:
     """Gear teeth that are pressed together rub.
 
-    Signature: lifting a weight takes more torque than lowering it, the more the heavier it is. Confused with Coulomb
-    friction, a torque limit and kp; poses of different load, each come to from above and from below, separate them: the
-    width between them grows with the load, and width and middle together give coefficient and kp.
+    Signature: lifting a weight takes more torque than lowering it, and the difference grows with the weight; a joint
+    holding a load stays within about 2 coefficient load / kp of where it would rest without friction. Confused with
+    Coulomb friction, a torque limit and kp; poses of different load, each come to from above and from below, separate
+    them: the width between them grows with the load, and width and middle together give coefficient and kp.
     """
 
     kind: ClassVar[str] = "servo"

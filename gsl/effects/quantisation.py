@@ -15,8 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class Quantisation:
     """A target of few bits.
 
-    Signature: slow motion is a staircase of this step. Confused with stiction, whose jumps have no common grid, and
-    with encoder noise, which also shows at rest; ramps slower than a step in a second separate them.
+    Signature: a slow motion is a staircase of this step, and a target rests up to half a step off; nothing else.
+    Confused with stiction, whose jumps have no common grid, and with encoder noise, which also shows at rest; ramps
+    slower than a step in a second separate them.
     """
 
     kind: ClassVar[str] = "command"

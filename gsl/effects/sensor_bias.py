@@ -1,4 +1,4 @@
-"""Logged positions are off by a constant; neither servo nor robot knows."""
+"""The log shows joint positions that are off by a constant; neither servo nor robot knows."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class SensorBias:
     """A constant in what the log and the policy see of the positions.
 
-    Signature: the same bias at every speed, load and pose; the robot moves as without it. Confused with a zero offset:
-    in the air the two are alike by nature; on the ground the base and the feet separate them, which a bias leaves
-    alone. Also with gravity tilt and masses: poses in which gravity pulls the other way separate them.
+    Signature: the same bias at every speed, load and pose, while the robot moves as if it were not there. Confused with
+    a zero offset: in the air the two are alike by nature; on the ground the base and the feet separate them, which a
+    bias leaves alone. Also with gravity tilt and masses: poses in which gravity pulls the other way separate them.
     """
 
     kind: ClassVar[str] = "sensor"

@@ -1,4 +1,4 @@
-"""Servo and log see what the encoders measured some time ago."""
+"""The encoders report the past: what they measured some time ago is what the servo and the log see."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class SensorDelay:
     """Filters and buses between encoder and servo.
 
-    Signature: the servo overshoots and rings, and the log is late. Confused with a command latency, whose log is as
-    late but does not ring, and with a low kd; a higher kp or kd separates them: an old measurement makes the loop
-    unstable, a late command does not.
+    Signature: the servo overshoots and rings, since it acts on old news, and the log is late on top. Confused with a
+    command latency, whose log is as late but does not ring, and with a low kd; a higher kp or kd separates them: an old
+    measurement makes the loop unstable, a late command does not.
     """
 
     kind: ClassVar[str] = "sensor"

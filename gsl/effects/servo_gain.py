@@ -17,9 +17,9 @@ _SOURCE = "estimate: published NAO models differ by more than this"
 class ServoGain:
     """Factors on the proportional and the derivative gain.
 
-    Signature: kp: static error under load, rise time; kd: overshoot. Confused with viscous friction (kd), gravity, link
-    mass and gain fade (kp); loaded against unloaded holds, a joint without torque, and the same pose early and late
-    separate them.
+    Signature: kp changes the static error under load and the rise time, kd the overshoot. Confused with viscous
+    friction (kd), gravity, link mass and gain fade (kp); loaded against unloaded holds, a joint without torque, and the
+    same pose early and late separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -1,4 +1,4 @@
-"""Dry friction at low speed only: torque exp(-(v / velocity)²)."""
+"""Dry friction that is there at low speed only: torque exp(-(v / velocity)²), added to the nominal."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class StribeckFriction:
     """Stiction: what holds a joint at rest and lets go once it moves.
 
-    Signature: it sticks and then jumps at the start of a motion, slow ramps become staircases. Confused with Coulomb
-    friction, which lags at every speed, and with backlash and quantisation; ramps of 0.01 to 0.1 rad/s beside fast ones
-    separate them.
+    Signature: it sticks and then jumps at the start of a motion, slow ramps become staircases; at speeds well above
+    `velocity` nothing. Confused with Coulomb friction, which lags at every speed, and with backlash and quantisation;
+    ramps of 0.01 to 0.1 rad/s beside fast ones separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -1,4 +1,4 @@
-"""The common supply sags under load, and with it all torque limits and no-load speeds."""
+"""The common supply's voltage sags under load, and with it every motor's torque limit and no-load speed."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class SupplySag:
     """Battery, cables and connectors have a resistance: V = V0 - resistance · sum of |torque| / torque constant.
 
-    Signature: weak and slow motors, but only while many of them work. Confused with a torque limit, which does not care
-    what the others do, and load-dependent friction; moving one joint and then all of them, or a log of the voltage,
-    separates them.
+    Signature: as weak and slow motors, but only while many of them work: one joint alone does better than the same
+    joint among all. Confused with a torque limit, which does not care what the others do, and load-dependent friction;
+    moving one joint and then all of them, or a log of the voltage, separates them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -1,4 +1,4 @@
-"""The servo filters its target by a first-order lag."""
+"""The servo filters its target: a first-order lag behind its command."""
 
 from __future__ import annotations
 
@@ -15,9 +15,10 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class TargetSmoothing:
     """A filter in the servo's firmware, or a profile that resembles one.
 
-    Signature: a step sets off at once but rounded; quick motion arrives smaller and later. Confused with a command
-    latency, a higher kd and viscous friction, since a slow motion is merely late; the onset of a step separates it from
-    a latency, steps of several sizes from a torque limit, another load from the servo's own dynamics.
+    Signature: a step sets off at once but rounded, 63 % of the way after the time constant; quick motion arrives
+    smaller and later; nothing at rest. Confused with a command latency, a higher kd and viscous friction, since a slow
+    motion is merely late; the onset of a step separates it from a latency, steps of several sizes from a torque limit,
+    another load from the servo's own dynamics.
     """
 
     kind: ClassVar[str] = "command"

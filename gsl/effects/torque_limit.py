@@ -1,4 +1,4 @@
-"""The torque limit differs by a factor; the speed line stays."""
+"""The torque limit differs from the nominal one by a factor; the speed line stays."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class TorqueLimit:
     """A weak (worn, hot, badly fed) motor.
 
-    Signature: clipped acceleration in large fast steps and under load. Confused with supply sag, load-dependent
-    friction, duty loss and target smoothing; a ladder of step sizes and of loads, one joint against all at once,
-    separate them.
+    Signature: clipped acceleration in large fast steps and under load, nothing in small ones. Confused with supply sag,
+    load-dependent friction, duty loss and target smoothing; a ladder of step sizes and of loads, one joint against all
+    at once, separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -1,4 +1,4 @@
-"""Gaussian noise on every torque: new at each physics step, and a constant for an episode."""
+"""Gaussian noise on the torque of every motor: new at each physics step, and a constant drawn once an episode."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ class TorqueNoise:
     actuation offset (ERFI, 2209.12878). White noise of another physics period has the same effect at
     `step` · sqrt(2 ms / period).
 
-    Signature: repeats of one command differ by constant / kp at rest, alike all through an episode. Confused with
-    action noise, which a stiff joint follows as well as a soft one, and with load friction and masses, which are the
-    same in every episode; repeats under another gain separate them.
+    Signature: repeats of one command differ by constant / kp at rest, alike all through an episode, and tremble.
+    Confused with action noise, which a stiff joint follows as well as a soft one, and with load friction and masses,
+    which are the same in every episode; repeats under another gain separate them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -13,8 +13,9 @@ from gsl.core.setting import component, setting
 class UnevenGround:
     """Heights drawn evenly from 0 to `height` at grid points, triangles between them, flat where the robot starts.
 
-    Signature: feet touch down early or late at random, and walks drift. Confused with action noise, which also acts in
-    the air, and ground compliance, which is the same at every place; repeats on one path and on others separate them.
+    Signature: feet touch down early or late at random, repeats differ in contact and walks drift; nothing in the air.
+    Confused with action noise, which also acts in the air, and ground compliance, which is the same at every place;
+    repeats on one path and on others separate them.
     """
 
     kind: ClassVar[str] = "contact"

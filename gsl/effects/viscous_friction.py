@@ -1,4 +1,4 @@
-"""Friction in proportion to speed: -coefficient dq/dt."""
+"""Friction in proportion to speed: -coefficient dq/dt, added to the nominal."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from gsl.effects.effect import SCOPE, Scope, scope
 class ViscousFriction:
     """Drag of the grease, and of a motor's back-EMF where the servo does not make up for it.
 
-    Signature: a lag in proportion to speed, zero at rest; a free fall slows down. Confused with kd, which does the same
-    while the servo is on, and with a command latency in slow motion; a joint whose torque is switched off, or a step
-    against its onset, separates them.
+    Signature: a lag in proportion to speed, zero at rest, and a free fall that slows down. Confused with kd, which does
+    the same while the servo is on, and with a command latency in slow motion; a joint whose torque is switched off, or
+    a step against its onset, separates them.
     """
 
     kind: ClassVar[str] = "servo"

@@ -1,4 +1,4 @@
-"""A joint goes to target + offset, and the log shows it."""
+"""A joint's zero is off: it goes to target + offset, and the log shows it."""
 
 from __future__ import annotations
 
