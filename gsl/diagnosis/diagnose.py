@@ -19,6 +19,7 @@ from gsl.diagnosis.search.looks import look
 from gsl.diagnosis.search.plausibility import find_idle, refute
 from gsl.diagnosis.search.reference import Nominal, calibrate_on, clock_shift
 from gsl.diagnosis.search.stepwise import Search, Selection, Thresholds
+from gsl.diagnosis.search.zeros import SHIFTS
 from gsl.diagnosis.settings import VerdictSettings
 from gsl.diagnosis.simulate.in_the_air import change
 from gsl.diagnosis.simulate.on_ground import Walking, model_error
@@ -131,7 +132,9 @@ def _search(
         reasons = refute(selection.chosen, log, problem.simulator.plant, options.plausibility)
         if not (log.walking or log.shaking_share):  # where derivatives mean little, so do intervals
             remaining = selection.chosen.level / (how.noise_cost * (1.0 + log.noise.slack))
-            reasons |= find_idle(selection.chosen, options.verdict.widening(remaining), log.robot)
+            idle = find_idle(selection.chosen, options.verdict.widening(remaining), log.robot)
+            upheld = search.uphold(selection.chosen) if set(idle) & set(SHIFTS) else set()
+            reasons |= {name: reason for name, reason in idle.items() if name not in upheld}
         if not reasons:
             selection = search.look_again(selection)
             problem.memory.clear()

@@ -116,7 +116,7 @@ class SearchSettings:
     flaw: float = 0.005  # of the calibration's cost, that a simulator's own flaws (its time step) let any effect gain
     room: float = 1.0  # cost of a residual that leaves room for a second effect
     room_after: float = 1.1  # and for a third and later ones: these have to be more than small
-    hidden: float = 1.5  # mean prior cost of a shift beyond which the calibration hides a cause; 1 is what it costs
+    room_of_one: float = 1.2  # the same of a single joint, whose held-out windows are few
     leads: int = 8  # that are fitted after the first screening
     leads_after: int = 5  # that are fitted beside an effect that stands already
     per_effect: int = 2  # of these, of one effect

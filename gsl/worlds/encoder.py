@@ -6,7 +6,7 @@ import numpy as np
 
 from gsl.core.compiled import compile_inner, compile_kernel
 
-REMEMBERED = 128  # physics steps: the longest sensor delay
+REMEMBERED = 256  # physics steps: the longest sensor delay
 
 
 @compile_inner

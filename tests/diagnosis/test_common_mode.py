@@ -14,6 +14,7 @@ from gsl.diagnosis.hypothesis.common_mode import hand_over, shares
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.options import Options
+from gsl.diagnosis.search.plausibility import find_idle
 from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.search.screening import extend
 from gsl.diagnosis.search.stepwise import Search, Thresholds
@@ -83,6 +84,28 @@ def test_zeros_of_many_joints_stand_by_their_calibration_whatever_chance_gains(o
     chance = Thresholds(share=0.5)  # as where joints shake
     chosen = Search(off, off.fit_calibration(), chance).select().chosen
     assert [candidate.scope for candidate in chosen.candidates] == ["legs"] * causes
+
+
+def test_zeros_that_stand_by_their_spread_stand_whatever_an_interval_says() -> None:
+    off = problem_of({"sensor_bias": {"bias": 0.006, "joints": "legs"}}).only(("sensor_bias", "zero_offset"))
+    search = Search(off, off.fit_calibration(), Thresholds(share=0.5))
+    chosen = search.select().chosen
+    assert set(find_idle(chosen, 3.0, NAO)) == search.uphold(chosen) == {"sensor_bias"}
+
+
+def test_a_gain_of_one_joint_is_named_beside_a_friction_of_all_though_the_calibration_explains_it() -> None:
+    effects = {"coulomb_friction": {"torque": 0.2}, "servo_gain": {"kp": 0.7, "joints": "LShoulderPitch"}}
+    both = problem_of(effects).only(("coulomb_friction", "servo_gain"))
+    chosen = Search(both, both.fit_calibration()).select().chosen
+    assert chosen.places == {("coulomb_friction", "all"), ("servo_gain", "LShoulderPitch")}
+
+
+def test_no_lead_is_followed_twice() -> None:
+    """A suspect joint is replayed alone, and read out of the replay of all joints besides."""
+    knee = problem_of({"coulomb_friction": {"torque": 0.3, "joints": "LKneePitch"}}).only(("coulomb_friction",))
+    fits, screening = extend(knee, knee.fit_calibration(), 8)
+    assert [fit.candidates[0].scope for fit in fits] == ["LKneePitch", "legs"]
+    assert [lead.candidate.scope for lead in screening.leads].count("LKneePitch") == 2
 
 
 def test_friction_that_differs_between_legs_and_arms_is_told_apart(dry: Problem) -> None:

@@ -12,12 +12,14 @@ from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.hypothesis.candidates import library
+from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.floor import NoiseFloor, noise_floor
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import to_records
 from gsl.diagnosis.log.repeats import find_repeats
 from gsl.diagnosis.search.screening import interpolate
 from gsl.diagnosis.simulate import calibration
+from gsl.diagnosis.simulate.simulator import simulator_of
 from gsl.diagnosis.verdict.document import document
 from gsl.effects.effect import SCOPE, Scope, apply_all, build, scope, use_own
 from gsl.report.diagnosis_text import summary_lines
@@ -230,12 +232,45 @@ def test_of_motions_without_names_blocks_of_each_are_held_out() -> None:
     assert named.by_record and not set(named.pieces.record[named.held_out]) & set(named.pieces.record[named.train])
 
 
+def test_of_repeats_of_one_motion_the_same_times_are_held_out() -> None:
+    batch = log({})
+    rows = {"time": 131, "action": 130, "position": 131, "velocity": 131}  # three windows of each
+    both = (batch.episodes[k] for k in (0, 8))
+    episodes = tuple(
+        replace(episode, **{key: getattr(episode, key)[:n] for key, n in rows.items()}) for episode in both
+    )
+    exp = cut_log(replace(batch, episodes=episodes, metadata={"episodes": [{}, {}]}), arm(), blocks=True)
+    held, fitted = ({*exp.pieces.tick[index]} for index in (exp.held_out, exp.train))
+    assert exp.motions == 1 and held and fitted and not held & fitted
+
+
 def test_repeats_stay_on_one_side_of_the_split() -> None:
     exp = cut_log(log({}), arm())
     held = {exp.records[k].name for k in exp.pieces.record[exp.held_out]}
     fitted = {exp.records[k].name for k in exp.pieces.record[exp.train]}
     assert held and fitted and not held & fitted
     assert {name[:-2] for name in held} == {name[:-2] for name in fitted}
+
+
+def test_no_latency_is_tried_that_servos_do_not_remember() -> None:
+    latency = next(candidate for candidate in library(arm()) if candidate.effect == "command_latency")
+    short = latency.up_to(0.015)
+    assert (short.bounds.max(), short.grid.max()) == (0.015, 0.015) and len(short.grid) < len(latency.grid)
+    fast = replace(cut_log(log({}), arm()), period=0.001)
+    problem = Problem.of(fast, simulator_of(cut_log(log({}), arm()), nominal(arm()), 0.002), QUICK, lambda phase: None)
+    (tried,) = (candidate for candidate in problem.library if candidate.effect == "command_latency")
+    assert tried.bounds.max() == pytest.approx(0.015)
+
+
+def test_replays_are_no_finer_than_a_late_encoder_is_remembered() -> None:
+    quiet = replace(log({}, noise=1e-7), metadata={"episodes": log({}).metadata["episodes"]})
+    simulator = simulator_of(cut_log(quiet, replace(arm(), encoder_step=1e-7)), nominal(arm()), 0.002)
+    late = apply_all(nominal(arm()), build({"sensor_delay": {"delay": 0.03}}))
+    path = [motions()["chirp_a"]]
+    steps = simulator.log_step, 2.0 * simulator.log_step
+    fine, coarse = (Held.of(late, step, PERIOD, accurate=True).play(path, [path[0][0]], 1)[0] for step in steps)
+    assert simulator.step < 0.0005
+    np.testing.assert_allclose(fine, coarse, atol=2e-3)
 
 
 def test_the_library_is_tried_whole_but_for_what_is_left_out() -> None:

@@ -210,7 +210,12 @@ def test_a_servo_far_from_its_log_or_worse_than_none_is_a_problem(air: tuple[Pat
     assert "try sim.step=0.002" in problems({**metrics, "floors_after": 4.2, "step": 0.004})[0]
     assert "1.20 noise floors, 1.00 without" in problems({**metrics, "floors_before": 1.0, "floors_after": 1.2})[0]
     assert any("not within 1" in line for line in remarks({**metrics, "floors_after": 2.0}))
-    none = {**metrics, "floors_after": 0.9, "learned": False, "groups": {"legs": {"floors_after": 0.9, "learned": False}}}
+    none = {
+        **metrics,
+        "floors_after": 0.9,
+        "learned": False,
+        "groups": {"legs": {"floors_after": 0.9, "learned": False}},
+    }
     assert remarks(none) == ["legs keep their servo: nothing that was learned brought held-out motions nearer"]
     assert problems(none) == []
     assert problems({**none, "floors_after": 2.5}) == [

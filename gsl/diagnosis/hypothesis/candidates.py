@@ -116,6 +116,10 @@ class Candidate:
         """Return the same with one more value of its only parameter in the grid."""
         return self if value is None else replace(self, grid=np.vstack([self.grid, [[value]]]), seen=value)
 
+    def up_to(self, most: float) -> Candidate:
+        """Return the same with its only parameter below a value."""
+        return replace(self, bounds=np.minimum(self.bounds, most), grid=np.unique(np.minimum(self.grid, most), axis=0))
+
     def entry(self, parameters: np.ndarray) -> dict[str, Any]:
         """Return the parameters of a world's `effects:` entry."""
         return {**self.fixed, **dict(zip(self.free, parameters.tolist(), strict=True))}

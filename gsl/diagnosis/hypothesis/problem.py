@@ -25,6 +25,7 @@ from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.diagnosis.simulate.simulator import Bench, Simulator
 from gsl.effects.effect import apply_all, build, effect_class, names, own
+from gsl.worlds.servo_state import COMMANDS
 
 LATENCY, PUSH = "command_latency", "external_push"
 IN_CONTACT = "contact"  # kind of effects that a robot in the air cannot show
@@ -75,6 +76,8 @@ class Problem:
             floating=log.walking,
             settings=options.search.grids,
         )
+        latest = (COMMANDS - 1) * log.period - float(simulator.plant.servo.delay.max())  # that servos remember
+        candidates = tuple(part.up_to(latest) if part.effect == LATENCY else part for part in candidates)
         if not log.walking:
             candidates = tuple(part for part in candidates if not _has_hook(part, simulator.plant, tick))
         return cls(

@@ -180,13 +180,14 @@ def _hold_out(
 ) -> tuple[np.ndarray, bool]:
     """Hold out what is asked for, else every second motion in the records' order; repeats stay together.
 
-    Of motions without names every second block is held out, if blocks have a length [ticks].
+    Of motions without names, and of repeats of one, every second block is held out, if blocks have a length [ticks].
     """
     if asked:
         return np.isin(pieces.record, asked), True
     motion = np.array([repeat.motion for repeat in repeats])
     motions = motion.max() + 1
-    if motions > 1 and block and not any(_name(record) for record in records):
+    alike = motions == 1 and len(records) > 1  # of which no repeat may show what another one is held out for
+    if block and (alike or (motions > 1 and not any(_name(record) for record in records))):
         later = np.array([round(repeat.later) for repeat in repeats])[pieces.record]
         return ((pieces.tick - later) // block + motion[pieces.record]) % 2 == 1, False
     if motions > 1:

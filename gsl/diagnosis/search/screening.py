@@ -244,11 +244,12 @@ def add_effect(effects: Effects, candidate: Candidate, parameters: np.ndarray) -
 
 
 def _best_leads(leads: Sequence[Lead], count: int, per_effect: int) -> list[Lead]:
-    """Return the best leads, not too many of one effect."""
+    """Return the best leads, not too many of one effect, and none twice: a suspect joint was replayed alone, too."""
     taken: dict[str, int] = {}
-    best: list[Lead] = []
+    best: dict[Any, Lead] = {}
     for lead in leads:
-        if taken.get(lead.candidate.effect, 0) < per_effect and len(best) < count:
-            taken[lead.candidate.effect] = taken.get(lead.candidate.effect, 0) + 1
-            best.append(lead)
-    return best
+        effect, key = lead.candidate.effect, lead.candidate.key
+        if key not in best and taken.get(effect, 0) < per_effect and len(best) < count:
+            taken[effect] = taken.get(effect, 0) + 1
+            best[key] = lead
+    return list(best.values())

@@ -146,6 +146,13 @@ class Search:
         first = next(stand, len(singles))
         return (singles[:first], singles[first:]) if first < len(singles) else ([], [])
 
+    def uphold(self, chosen: Hypothesis) -> set[str]:
+        """Return the effects that stand because zeros of many joints are off to one side, whatever intervals say."""
+        zeros = [k for k, candidate in enumerate(chosen.candidates) if candidate.effect in SHIFTS]
+        fewer = {k: self.drop(chosen, k) if chosen.size > 1 else self.none for k in zeros}
+        alone = [k for k, other in fewer.items() if moves_zeros_alone(self.problem, chosen, other)]
+        return {chosen.candidates[k].effect for k in alone if explains_zeros(self.problem, chosen, fewer[k])}
+
     def look_again(self, selection: Selection) -> Selection:
         """Return a selection that knows what is invisible on top of the chosen hypothesis.
 
@@ -200,8 +207,16 @@ class Search:
 
     def _lacking(self, standing: Hypothesis, level: float) -> bool:
         """Whether more is left than noise, or hidden in shifts; the cost of joints that shake does not show it."""
-        hides = standing.fit.prior_cost > self._how.hidden * standing.fit.shifts.size
-        return standing.level > level or hides or bool(self.problem.train.comparison.shaking.any())
+        few = float(standing.levels.max()) > self._how.room_of_one  # which a mean over all joints does not show
+        hides = self._most_to_free(standing) > self._bar(standing)[0]
+        return standing.level > level or few or hides or bool(self.problem.train.comparison.shaking.any())
+
+    def _most_to_free(self, standing: Hypothesis) -> float:
+        """Return the prior cost that a cause would free most of: what the shifts of some joints have in common."""
+        size = self.problem.simulator.spread * SPREADS[:, None]
+        shifts = standing.fit.shifts / size
+        freed = [(shifts[:, mask].mean(axis=1) ** 2).max() * mask.sum() for mask in self.problem.scopes.values()]
+        return float(max(freed))
 
     def _distinct(self, singles: list[Hypothesis]) -> list[Hypothesis]:
         """Return the best hypotheses of different effects, not more than the beam is wide."""

@@ -22,6 +22,7 @@ from gsl.worlds.held import Held
 CHECKED = 12  # held-out windows that are replayed in Bullet, and windows on which a step is chosen
 SMALL = 0.1  # share of the floor that the time step may be off
 HALVINGS = 3  # of the step, at most: replays take as many times as long
+FINEST = 2.4e-4  # step [s]: encoders remember so many of half this size that a sensor delay of 30 ms is within
 
 
 class Simulator(Protocol):
@@ -94,7 +95,7 @@ def _find_step(log: Log, plant: Plant, step: float) -> float:
         if (apart < SMALL * floor).all():
             break
         step *= 0.5
-    return fitting_step(step, log.period)
+    return fitting_step(max(step, FINEST), log.period)
 
 
 @dataclass(frozen=True)
