@@ -149,7 +149,7 @@ def _survivors(selection: Selection, how: VerdictSettings) -> list[Hypothesis]:
     behind = max(how.behind, how.behind_share * (selection.none.cost - chosen.cost))
     for rival in selection.rivals if chosen.candidates else ():
         other = set(rival.names) not in [set(kept.names) for kept in survivors]
-        near = rival.cost - chosen.cost < behind
+        near = rival.cost < min(selection.none.cost, chosen.cost + behind)
         if rival.size == chosen.size and other and near and len(survivors) < how.survivors:
             survivors.append(rival)
     return survivors

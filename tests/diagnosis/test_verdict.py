@@ -66,6 +66,16 @@ def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
     assert min(cause.probability for cause in tried.causes) > VerdictSettings.unrivalled
 
 
+@pytest.mark.parametrize(("cost", "rival"), [(1000.0, "load_friction"), (1200.0, None)])
+def test_what_costs_more_than_a_calibration_is_no_rival(cost: float, rival: str | None) -> None:
+    """Its own simulated logs are of other robots, and may differ from the real one by any amount."""
+    load = replace(claim("load_friction", [0.2], ("coefficient",)), costs=np.full(8, cost), counts=PER_SAMPLE)
+    judge = Judge(1.0, margins={"load_friction": 1e6})
+    (cause,) = judge.judge(selection(friction("shoulder", 100.0), load)).causes
+    assert cause.rival == rival
+    assert (cause.probability > 0.9) == (rival is None)
+
+
 def test_a_rival_whose_own_logs_get_the_same_answer_is_not_told_apart() -> None:
     joint = friction("shoulder", 100.0)
     load = replace(claim("load_friction", [0.2], ("coefficient",)), costs=np.full(8, 150.0), counts=PER_SAMPLE)
@@ -100,6 +110,8 @@ def test_within_a_guessed_noise_nothing_is_named(cost: float, guessed: bool, wor
     better = replace(selection(friction("all", 0.3 * cost)), none=none)
     verdict = Judge(1.0, guessed=guessed).judge(better)
     assert (verdict.word, verdict.hollow) == (word, word == "unknown")
+    unusual = replace(better, none=replace(none, fit=replace(none.fit, prior_cost=150.0)), least=20.0)
+    assert not Judge(1.0, guessed=guessed).judge(unusual).hollow  # what a calibration would have to be far off for
 
 
 @pytest.mark.parametrize(

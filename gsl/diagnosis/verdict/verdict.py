@@ -130,7 +130,10 @@ class Judge:
         groups = self._inseparable(chosen, causes)
         sure = complete * (how.lone if self.lone else 1.0)
         scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
-        hollow = self.guessed and none.level < how.beneath * self.expected
+        freed = (
+            none.fit.prior_cost - chosen.fit.prior_cost
+        )  # by a cause that a calibration would have to be unusual for
+        hollow = self.guessed and none.level < how.beneath * self.expected and freed <= selection.least
         word = "unknown" if hollow or complete < 0.5 else "inseparable" if groups else "causes"
         return Verdict(word, scaled, groups, explained, remaining, complete, how.whole, missing, hollow)
 
@@ -162,6 +165,8 @@ class Judge:
         best = min((fit for fit in rivals if fit.size == chosen.size), key=by_cost, default=None)
         if best is None:
             return Cause(k, self.settings.unrivalled, None, value, low, high)
+        if best.cost >= none.cost:  # it explains nothing: the calibration itself is the rival
+            return Cause(k, self._probability(none, chosen, self.doubt * chosen.cost), None, value, low, high)
         other = name_in_place(chosen, best)
         spread = max(self.margins.get(other, 0.0), self.doubt * chosen.cost)
         probability = self._probability(best, chosen, spread)
