@@ -350,6 +350,11 @@ def test_what_cannot_reach_a_band_is_refused() -> None:
     assert turn_up(lambda share: 1.0 + share, "medium", np.random.default_rng(0)) is None
 
 
+def test_what_is_in_a_band_however_small_it_is_has_no_size_and_is_refused() -> None:
+    assert turn_up(lambda share: 4.0 + 10.0 * share, "medium", np.random.default_rng(0)) is None
+    assert turn_up(lambda share: 2.0 + 10.0 * share, "medium", np.random.default_rng(0)) is not None
+
+
 @pytest.mark.parametrize("kind", [NULL, JOINT, TWO, WITHHELD, ABSENT])
 def test_a_case_is_what_its_slot_wants(kind: str) -> None:
     shop = Workshop(nominal(arm()), 0.002, PERIOD, (programme(),))

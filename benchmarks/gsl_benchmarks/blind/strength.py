@@ -103,6 +103,9 @@ def turn_up(
 ) -> tuple[float, float] | None:
     """Return the share of an effect's range at which its gap lies in a band, and the gap; None if it cannot.
 
+    An effect that makes such a gap with hardly any of its range is not turned up: its truth would have no size. So does
+    play, whose teeth are elastic however narrow it is.
+
     Args:
         gap: From the share to the gap.
         strength: Name of the band.
@@ -111,7 +114,7 @@ def turn_up(
     """
     low, high = bands[strength][0] * INSIDE, bands[strength][1] / INSIDE
     most = gap(1.0)
-    if most < low:
+    if most < low or gap(LEAST_SHARE) >= low:
         return None
     target = float(np.exp(rng.uniform(np.log(low), np.log(min(high, most)))))
     below, above = np.log(LEAST_SHARE), 0.0
