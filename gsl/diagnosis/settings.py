@@ -117,9 +117,10 @@ class SearchSettings:
     room: float = 1.0  # cost of a residual that leaves room for a second effect
     room_after: float = 1.1  # and for a third and later ones: these have to be more than small
     room_of_one: float = 1.2  # the same of a single joint, whose held-out windows are few
-    leads: int = 8  # that are fitted after the first screening
+    hidden: float = 0.5  # share of what a cause has to gain, that it frees of the cost of shifts: residuals give more
+    leads: int = 10  # that are fitted after the first screening
     leads_after: int = 5  # that are fitted beside an effect that stands already
-    per_effect: int = 2  # of these, of one effect
+    again: int = 3  # one in so many of these may be of an effect that has a better one
     hardly: float = 0.1  # share of what a screening saw of an effect, from which a fit beside others begins as well
     beam: int = 2  # single effects that are continued
     few: int = 20  # training windows of which a screening leaves none out

@@ -96,7 +96,7 @@ def test_a_rotor_that_is_as_light_as_it_can_be_is_out_of_family() -> None:
     light = clip_shifts(np.where(np.arange(7)[:, None] == INERTIA, -99.0, 0.0) * np.array([1.0, 0.0]))
     answer = replace(result.selection.none, fit=replace(fit, shifts=light))
     selection = replace(result.selection, none=answer, chosen=answer)
-    assert out_of_family(replace(result, selection=selection)) == ["shoulder (inertia -6.2 g·m², at its limit)"]
+    assert out_of_family(replace(result, selection=selection)) == ["shoulder (inertia -2.5 g·m², at its limit)"]
     assert out_of_family(result) == []
 
 

@@ -9,11 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from gsl.diagnosis.hypothesis.candidates import Candidate
+from gsl.diagnosis.hypothesis.common_mode import hand_over, shares
 from gsl.diagnosis.hypothesis.fit import fit_proportional, fit_shifts, sensitivities
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.settings import SearchSettings
-from gsl.diagnosis.simulate.calibration import no_shifts
+from gsl.diagnosis.simulate.calibration import no_shifts, prior_cost
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.diagnosis.simulate.simulator import Bench
 
@@ -119,8 +120,32 @@ def extend(problem: Problem, base: Hypothesis, width: int) -> tuple[list[Hypothe
     """Return hypotheses with one effect more than `base`, best first, and the screening that led to them."""
     screening = screen(problem, base)
     new = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in base.places]
-    fits = [_fit_lead(problem, base, lead) for lead in _best_leads(new, width, problem.settings.per_effect)]
+    fits = [_fit_lead(problem, base, lead) for lead in _best_leads(new, width, problem.settings.again)]
+    fits += _free_shifts(problem, base, [fit.places for fit in fits])
     return sorted(fits, key=by_cost), screening
+
+
+def _free_shifts(problem: Problem, base: Hypothesis, tried: Sequence[set[tuple[str, str]]]) -> list[Hypothesis]:
+    """Fit the cause that frees most of what shifts cost, if that is enough: a screening lets every joint hide its own.
+
+    Args:
+        problem: Where it competes.
+        base: What stands.
+        tried: Places of what has been fitted on top of it.
+    """
+    at, unit, spread = base.fit.shifts, problem.simulator.plant.robot.torque_unit, problem.simulator.spread
+    best, most = None, problem.settings.hidden * problem.settings.gain
+    for candidate in (part.on(scope) for part in problem.library if part.on_joints for scope in problem.scopes):
+        common = shares([candidate], problem.scopes, unit)
+        if len(common) != 1 or {*base.places, (candidate.effect, candidate.scope)} in tried:
+            continue
+        theta, left = hand_over(candidate.neutral, at, candidate.bounds, common)
+        if (freed := prior_cost(at, spread) - prior_cost(left, spread)) > most:
+            best, most = (candidate, theta, left), freed
+    if best is None or (best[0].effect, best[0].scope) in base.places:
+        return []
+    candidate, theta, left = best
+    return [problem.fit((*base.candidates, candidate), np.r_[base.start, theta], left)]
 
 
 def _fit_lead(problem: Problem, base: Hypothesis, lead: Lead) -> Hypothesis:
@@ -243,13 +268,19 @@ def add_effect(effects: Effects, candidate: Candidate, parameters: np.ndarray) -
     return {**effects, candidate.effect: [*effects.get(candidate.effect, []), candidate.entry(parameters)]}
 
 
-def _best_leads(leads: Sequence[Lead], count: int, per_effect: int) -> list[Lead]:
-    """Return the best leads, not too many of one effect, and none twice: a suspect joint was replayed alone, too."""
-    taken: dict[str, int] = {}
-    best: dict[Any, Lead] = {}
+def _best_leads(leads: Sequence[Lead], count: int, again: int) -> list[Lead]:
+    """Return the best lead of each effect, and some effects once more at other joints.
+
+    A suspect joint was replayed alone and is read out of the replay of all joints besides: no lead is taken twice.
+
+    Args:
+        leads: Best first.
+        count: How many.
+        again: Of these, one in so many may be of an effect that has one already.
+    """
+    first, others = dict[str, Lead](), dict[str, Lead]()
     for lead in leads:
-        effect, key = lead.candidate.effect, lead.candidate.key
-        if key not in best and taken.get(effect, 0) < per_effect and len(best) < count:
-            taken[effect] = taken.get(effect, 0) + 1
-            best[key] = lead
-    return list(best.values())
+        if first.setdefault(lead.candidate.effect, lead).candidate.key != lead.candidate.key:
+            others.setdefault(lead.candidate.effect, lead)
+    more = list(others.values())[: count // again]
+    return [*list(first.values())[: count - len(more)], *more]

@@ -208,7 +208,7 @@ class Search:
     def _lacking(self, standing: Hypothesis, level: float) -> bool:
         """Whether more is left than noise, or hidden in shifts; the cost of joints that shake does not show it."""
         few = float(standing.levels.max()) > self._how.room_of_one  # which a mean over all joints does not show
-        hides = self._most_to_free(standing) > self._bar(standing)[0]
+        hides = self._most_to_free(standing) > self._how.hidden * self._bar(standing)[0]
         return standing.level > level or few or hides or bool(self.problem.train.comparison.shaking.any())
 
     def _most_to_free(self, standing: Hypothesis) -> float:

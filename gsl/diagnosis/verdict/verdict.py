@@ -130,9 +130,7 @@ class Judge:
         groups = self._inseparable(chosen, causes)
         sure = complete * (how.lone if self.lone else 1.0)
         scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
-        freed = (
-            none.fit.prior_cost - chosen.fit.prior_cost
-        )  # what a calibration would have to be unusual for
+        freed = none.fit.prior_cost - chosen.fit.prior_cost  # what a calibration would have to be unusual for
         hollow = self.guessed and none.level < how.beneath * self.expected and freed <= selection.least
         word = "unknown" if hollow or complete < 0.5 else "inseparable" if groups else "causes"
         return Verdict(word, scaled, groups, explained, remaining, complete, how.whole, missing, hollow)
