@@ -90,9 +90,9 @@ class LearnedServo:
             raise ConfigError("grounding.servo", "is missing; name a run of gsl train-servo")
         model = read_servo(self.servo)
         if other_base(checked.plant, model):  # one of a log that has its gains stands on these
-            place = resolve(self.servo, kind=MAKER)
-            gains = gains_of(Artifact(place, manifest.read(place)).metrics)
-            checked = replace(checked, effects=together([checked.effects, gains]))
+            place = Path(self.at_its_place().servo)
+            about = Artifact(place, manifest.read(place)).metrics if (place / manifest.NAME).is_file() else {}
+            checked = replace(checked, effects=together([checked.effects, gains_of(about)]))
         if other := other_base(checked.plant, model):
             raise ConfigError("grounding.servo", f"was learned on top of another servo: {other}", given=self.servo)
         first = self.shaken(replace(checked, servo=self.servo))

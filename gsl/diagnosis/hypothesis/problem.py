@@ -77,7 +77,8 @@ class Problem:
             settings=options.search.grids,
         )
         latest = (COMMANDS - 1) * log.period - float(simulator.plant.servo.delay.max())  # that servos remember
-        candidates = tuple(part.up_to(latest) if part.effect == LATENCY else part for part in candidates)
+        kept = (part for part in candidates if part.effect != LATENCY or latest > 0.0)
+        candidates = tuple(part.up_to(latest) if part.effect == LATENCY else part for part in kept)
         if not log.walking:
             candidates = tuple(part for part in candidates if not _has_hook(part, simulator.plant, tick))
         return cls(

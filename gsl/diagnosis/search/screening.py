@@ -125,7 +125,7 @@ def extend(problem: Problem, base: Hypothesis, width: int) -> tuple[list[Hypothe
     return sorted(fits, key=by_cost), screening
 
 
-def _free_shifts(problem: Problem, base: Hypothesis, tried: Sequence[set[tuple[str, str]]]) -> list[Hypothesis]:
+def _free_shifts(problem: Problem, base: Hypothesis, tried: Sequence[frozenset[tuple[str, str]]]) -> list[Hypothesis]:
     """Fit the cause that frees most of what shifts cost, if that is enough: a screening lets every joint hide its own.
 
     Args:
