@@ -40,6 +40,7 @@ from gsl.validation.compliance_transfer import report_compliance
 from gsl.validation.drift import drifts, read_region
 from gsl.validation.gate import REPORT, Gate
 from gsl.validation.screening import Screening, foretells_falls, passing, screen
+from gsl.worlds.ensemble import take_turns
 
 BEST = "best_in_simulation.json"
 
@@ -230,7 +231,11 @@ class Optimize:
         race = Race(len(candidates), self.rollouts, error, self._judge, rng)
         falls = np.zeros(len(candidates), dtype=int)
         while pairs := race.pairs():
-            jobs = [Job(candidates[n], derive_seed(self.seed, self.kind, index, n, rollout)) for n, rollout in pairs]
+            seeds = [
+                take_turns(scenario.world, derive_seed(self.seed, self.kind, index, n, rollout), index + rollout)
+                for n, rollout in pairs
+            ]
+            jobs = [Job(candidates[n], seed) for (n, _), seed in zip(pairs, seeds, strict=True)]
             done = episodes(scenario, jobs, workers=self.workers, progress=progress)
             np.add.at(falls, [n for n, _ in pairs], [episode.fell for episode in done])
             race.take([episode.value for episode in done])

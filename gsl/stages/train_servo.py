@@ -99,7 +99,7 @@ class TrainServo:
         write_model(folder, ServoMembers((model, *further)))
         self._write_world(folder, learned)
         servo_curves(folder / CURVES, self.sim.plant, model, fitting_step(self.sim.step, exp.period), exp.period)
-        metrics = document(learned) | {"step": fitting_step(self.sim.step, exp.period)}
+        metrics = document(learned) | {"step": fitting_step(self.sim.step, exp.period), "period": exp.period}
         for line in remarks(metrics):
             console.status(f"warning: {line}")
         noises = dict(zip(model.joints, model.noise.tolist(), strict=True))

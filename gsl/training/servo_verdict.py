@@ -5,7 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
+from gsl.core.servo_law import LAG, LAGS
+from gsl.worlds.servo_state import COMMANDS
+
 NEAR, FARTHEST = 1.0, 3.0  # noise floors: up to the first it is as good as the log can tell, beyond the second useless
+PERIOD = 0.005  # of control [s], of which servos remember as much as the law sees
 COARSE = 0.0025  # physics period [s] above which joints of a NAO leave the replay (docs/results/speed.md)
 
 
@@ -46,6 +52,10 @@ def remarks(metrics: Mapping[str, Any]) -> list[str]:
     remarks = (
         [] if after <= NEAR else [f"held out, the learned servo is {after:.1f} noise floors from the log, not within 1"]
     )
+    remembered, seen = (COMMANDS - 1) * metrics.get("period", np.inf), LAG * (LAGS - 1)
+    if remembered < seen:
+        back = f"servos remember {1e3 * remembered:g} ms of commands at the log's rate, the law sees {1e3 * seen:g} ms back"
+        remarks.append(f"{back}: import the log with `period: {PERIOD:g}` in its mapping")
     if not metrics["whole_motions"]:
         remarks.append("the log is one motion, of which parts are held out: the figures are optimistic")
     for name, group in metrics["groups"].items():

@@ -20,6 +20,7 @@ from gsl.training.data import FALLS, of_policy
 from gsl.validation.reachability import Reachability, reachability
 from gsl.validation.replay import PAST, Deviations, places, predict_no_change, replay_starts
 from gsl.validation.report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
+from gsl.worlds.ensemble import take_turns
 
 REPLAYS = 60  # of each group of trajectories, at most
 ASKED = 40  # steps of which it is asked whether the simulator can do them
@@ -129,7 +130,7 @@ def pi0_in(
     """Return value and fall of some episodes of π0, up to one fall more than `patience`."""
     env, done = scenario.make(), []
     for index in range(EPISODES):
-        episode = rollout(scenario, env, parameters, derive_seed(seed, index))
+        episode = rollout(scenario, env, parameters, take_turns(scenario.world, derive_seed(seed, index), index))
         done.append((episode.value, episode.ended_in_a_fall))
         if sum(fell for _, fell in done) > patience:
             break

@@ -12,7 +12,15 @@ import numpy as np
 from gsl.core.layout import Layout
 from gsl.worlds.bullet import BulletEnv, BulletWorld
 
-_STREAM = 17  # sets the choice's randomness apart from that of the world, whose seed is the same
+TURNS = 2**12  # the last bits of a seed say which member an episode is in
+
+
+def take_turns(world: Any, seed: int, turn: int) -> int:
+    """Return the seed of an episode that meets the next member of an ensemble at every turn; of other worlds the same.
+
+    Chance would let a candidate of a search miss the member in which it falls.
+    """
+    return seed - seed % TURNS + turn % TURNS if isinstance(world, EnsembleWorld) else seed
 
 
 @dataclass(frozen=True)
@@ -55,8 +63,8 @@ class EnsembleEnv(gymnasium.Env):
     ) -> tuple[np.ndarray, dict[str, bool]]:
         """Start anew in a member; arguments as those of `BulletEnv.reset`."""
         super().reset(seed=seed)
-        rng = self.np_random.spawn(1)[0] if seed is None else np.random.default_rng([seed, _STREAM])
-        number = int(rng.integers(len(self._members)))
+        turn = int(self.np_random.integers(TURNS)) if seed is None else seed % TURNS
+        number = turn % len(self._members)
         if number not in self._built:
             host = next(iter(self._built.values()), None)
             self._built[number] = BulletEnv(self._members[number], host=host)

@@ -41,7 +41,7 @@ from gsl.training.servo_verdict import problems_of_members
 from gsl.validation.check_grounding import check_grounding
 from gsl.validation.gate import Gate
 from gsl.worlds.bullet import BulletWorld
-from gsl.worlds.ensemble import EnsembleWorld
+from gsl.worlds.ensemble import EnsembleWorld, take_turns
 
 pytestmark = pytest.mark.slow
 
@@ -151,6 +151,16 @@ def test_an_episode_is_that_of_one_member_alone_whatever_came_before() -> None:
     assert {members[0] for members in members_of.values()} == {0, 1, 2}
     first.close()
     second.close()
+
+
+def test_episodes_that_take_turns_meet_every_member() -> None:
+    ensemble = EnsembleWorld(GROUND, tuple(soft(kp) for kp in (1.0, 0.5, 0.2)))
+    seeds = [take_turns(ensemble, 12345 + 9876 * turn, turn) for turn in range(4)]
+    env = ensemble.make()
+    for turn, seed in enumerate(seeds):
+        np.testing.assert_array_equal(positions(env, seed), alone(ensemble.members[turn % 3], seed))
+    env.close()
+    assert len(set(seeds)) == 4 and take_turns(GROUND, 12345, 2) == 12345
 
 
 def test_an_ensemble_of_one_is_its_member() -> None:

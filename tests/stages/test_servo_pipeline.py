@@ -222,5 +222,7 @@ def test_a_servo_far_from_its_log_or_worse_than_none_is_a_problem(air: tuple[Pat
         "nothing was learned: held out, the gap stays at 2.5 noise floors"
     ]
     assert "figures are optimistic" in remarks({**metrics, "whole_motions": False})[0]
+    assert "servos remember 30 ms of commands at the log's rate" in remarks({**metrics, "period": 0.002})[0]
+    assert remarks({**metrics, "period": 0.005}) == remarks(metrics)
     far = {"legs": {"floors_before": 9.0, "floors_after": 3.4, "learned": True}}
     assert "legs are 3.4 noise floors from the log, more than 3" in remarks({**metrics, "groups": far})[-1]
