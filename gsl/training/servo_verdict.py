@@ -54,8 +54,8 @@ def remarks(metrics: Mapping[str, Any]) -> list[str]:
     )
     remembered, seen = (COMMANDS - 1) * metrics.get("period", np.inf), LAG * (LAGS - 1)
     if remembered < seen:
-        back = f"servos remember {1e3 * remembered:g} ms of commands at the log's rate, the law sees {1e3 * seen:g} ms back"
-        remarks.append(f"{back}: import the log with `period: {PERIOD:g}` in its mapping")
+        back = f"servos remember {1e3 * remembered:g} ms of commands at the log's rate, the law sees {1e3 * seen:g} ms"
+        remarks.append(f"{back}: gsl import mapping.period={PERIOD:g} resamples the log")
     if not metrics["whole_motions"]:
         remarks.append("the log is one motion, of which parts are held out: the figures are optimistic")
     for name, group in metrics["groups"].items():
