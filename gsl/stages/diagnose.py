@@ -18,7 +18,7 @@ from gsl.core.trajectory import Batch
 from gsl.diagnosis.design.next_experiment import write_next_experiment
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.files import check_log, clock_caveat, log_parents, on_ground, read_logs, share_clock
-from gsl.diagnosis.log.gains import added_gains, unseen_gains, with_logged_gains
+from gsl.diagnosis.log.gains import list_added_gains, unseen_gains, with_logged_gains
 from gsl.diagnosis.log.log import label_indices
 from gsl.diagnosis.log.records import labels_of
 from gsl.diagnosis.options import Clocks, Duels, Most, Nulls, Options, PhaseReporter, Tolerance, Without
@@ -88,7 +88,7 @@ class Diagnose:
         sim = with_logged_gains(self.sim, [episode.sensors for episode in log.episodes], self.real)
         if sim is not self.sim:
             console.status("note: the simulator's servos get the gains of the log")
-            return {**replace(self, sim=sim).run(folder, console), **added_gains(self.sim, sim)}
+            return {**replace(self, sim=sim).run(folder, console), **list_added_gains(self.sim, sim)}
         label_indices(labels_of(log), self.held_out)  # refuses labels that there are not, before minutes of work
         wiring = audit_log(log, self.sim, self.real, console) if self.audit else None
         if wiring and wiring.spoils:

@@ -16,7 +16,7 @@ from gsl.core.interruption import checkpoint
 from gsl.core.setting import component, setting
 from gsl.diagnosis.angles import effects_in_metres
 from gsl.diagnosis.log.files import log_parents, read_logs, take_motions
-from gsl.diagnosis.log.gains import added_gains, unseen_gains, with_logged_gains
+from gsl.diagnosis.log.gains import list_added_gains, unseen_gains, with_logged_gains
 from gsl.diagnosis.options import Options, Without
 from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.simulate.calibration import no_shifts
@@ -64,7 +64,7 @@ class Identify:
         sensors = [episode.sensors for episode in batch.episodes]
         sim = with_logged_gains(self.sim, sensors, self.real)
         if sim is not self.sim:
-            return {**replace(self, sim=sim).run(folder, console), **added_gains(self.sim, sim)}
+            return {**replace(self, sim=sim).run(folder, console), **list_added_gains(self.sim, sim)}
         if warning := unseen_gains(sensors, log.joints):
             console.status(f"warning: {warning}")
         options = Options(self.without, threads=threads(self.workers))

@@ -16,7 +16,7 @@ from gsl.core.plant import Plant
 from gsl.core.setting import component, setting
 from gsl.core.words import several
 from gsl.diagnosis.log.files import check_log, log_parents, on_ground, read_logs, take_motions
-from gsl.diagnosis.log.gains import added_gains, unseen_gains, with_logged_gains
+from gsl.diagnosis.log.gains import list_added_gains, unseen_gains, with_logged_gains
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Tolerance
 from gsl.errors import ConfigError, InputError
@@ -78,7 +78,7 @@ class TrainServo:
         sensors = [episode.sensors for episode in batch.episodes]
         sim = with_logged_gains(self.sim, sensors, self.real)
         if sim is not self.sim:
-            return {**replace(self, sim=sim).run(folder, console), **added_gains(self.sim, sim)}
+            return {**replace(self, sim=sim).run(folder, console), **list_added_gains(self.sim, sim)}
         if warning := unseen_gains(sensors, exp.joints):
             console.status(f"warning: {warning}")
         if len(exp.held_out) < 2:

@@ -18,7 +18,7 @@ from gsl.core.other_commands import gains_of, read_other_commands
 from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnose
-from gsl.diagnosis.log.gains import added_gains, with_logged_gains
+from gsl.diagnosis.log.gains import list_added_gains, with_logged_gains
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.log.records import cut_pieces
 from gsl.diagnosis.simulate.calibration import no_shifts
@@ -134,9 +134,9 @@ def test_the_servos_get_the_gains_of_the_log(gains: tuple[float, float]) -> None
     sim = with_logged_gains(SIM, logged, "log")
     np.testing.assert_allclose([sim.plant.servo.kp[0], sim.plant.servo.kd[0]], gains)
     assert with_logged_gains(sim, logged, "log") is sim
-    added = added_gains(SIM, sim)
+    added = list_added_gains(SIM, sim)
     assert replace(SIM, effects=gains_of(added)).plant.servo.kp == sim.plant.servo.kp
-    assert added_gains(SIM, SIM) == {} and gains_of({}) == {}
+    assert list_added_gains(SIM, SIM) == {} and gains_of({}) == {}
     diagnosed = replace(sim, effects=together([sim.effects, {"servo_gain": [{"kp": 0.7, "joints": "joint"}]}]))
     assert with_logged_gains(diagnosed, logged, "log") is diagnosed  # its fault is no gain that the log commands
 

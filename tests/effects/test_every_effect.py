@@ -215,8 +215,8 @@ def test_two_stictions_leave_their_mean_velocity_whichever_comes_first() -> None
         ({"uneven_ground": {"height": 0.01, "spacing": 0.0}}, "effects.uneven_ground.spacing.*at least 0.02"),
         ({"command_latency": {"delay": 0.15}}, None),
         ({"command_latency": [{"delay": 0.15}] * 3}, "effects.command_latency.delay = 0.45: at most 0.3 s"),
-        ({"sensor_delay": {"delay": 0.256}}, None),
-        ({"sensor_delay": {"delay": 0.257}}, "effects.sensor_delay.delay = 0.257: at most 0.256 s"),
+        ({"sensor_delay": {"delay": 0.512}}, None),
+        ({"sensor_delay": {"delay": 0.513}}, "effects.sensor_delay.delay = 0.513: at most 0.512 s"),
     ],
 )
 def test_what_cannot_be_simulated_is_refused_in_a_line(effects: dict[str, Any], line: str | None) -> None:

@@ -258,11 +258,11 @@ def test_a_log_that_had_gains_of_its_own_hands_them_over(tmp_path: Path) -> None
     gains = {"servo_gain": [{"kp": 0.4, "joints": "legs"}]}
     logged = {LOGGED_GAINS: gains["servo_gain"]}
     servo = LearnedServo(servo=made(Servo(1, gains, logged), tmp_path / "runs/log/train_servo"))
-    found = read_diagnosis(made(Found(more=logged), tmp_path / "runs/log/diagnose"), "diagnose")
+    diagnosis = read_diagnosis(made(Found(more=logged), tmp_path / "runs/log/diagnose"), "diagnose")
     commanded = replace(NAO, effects=gains)
     np.testing.assert_array_equal(servo.switch_on(NAO).plant.servo.kp, servo.switch_on(commanded).plant.servo.kp)
     whole = replace(NAO, effects=together([gains, EFFECTS]))
-    np.testing.assert_allclose(switch_on(NAO, found).plant.servo.kp, whole.plant.servo.kp)
+    np.testing.assert_allclose(switch_on(NAO, diagnosis).plant.servo.kp, whole.plant.servo.kp)
 
 
 def test_drawn_effects_and_members_of_a_servo_go_together(folder: Path, tmp_path: Path) -> None:

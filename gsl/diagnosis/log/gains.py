@@ -58,7 +58,7 @@ def with_logged_gains(sim: BulletWorld, sensors: Sensors, name: str) -> BulletWo
     return replace(sim, effects=together([sim.effects, {GAIN_EFFECT: _entries(factors)}]))
 
 
-def added_gains(before: BulletWorld, after: BulletWorld) -> dict[str, Any]:
+def list_added_gains(before: BulletWorld, after: BulletWorld) -> dict[str, Any]:
     """Return what metrics say of gains that a log gave to a simulator, nothing if it gave none."""
     if after is before:
         return {}
