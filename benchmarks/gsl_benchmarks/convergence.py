@@ -1,6 +1,6 @@
 """A study of the physics period and the solver's iterations: what a coarser engine changes of the walk and of the gap.
 
-`python -m gsl_benchmarks.convergence` prints the table of docs/reference/worlds.md (minutes).
+`python -m gsl_benchmarks.convergence` prints the table of which docs/reference/worlds.md has a part (minutes).
 """
 
 from __future__ import annotations

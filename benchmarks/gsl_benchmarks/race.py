@@ -1,7 +1,8 @@
 """A study of racing: what it saves of a search in which every candidate plays all rollouts, and who wins.
 
 `python -m gsl_benchmarks.race` plays the search once. Each generation is then raced on the values that were played, so
-that both have the same seeds. It prints the table of docs/results/speed.md (hours; `--candidates`, `--generations`).
+that both have the same seeds. docs/results/speed.md has the mean of what it
+prints (hours; `--candidates`, `--generations`).
 What was played goes to `--played`, from where a study that was stopped goes on.
 """
 

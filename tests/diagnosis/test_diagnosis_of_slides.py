@@ -214,10 +214,20 @@ def test_a_cause_is_named_in_units_of_its_joint(effect: str) -> None:
     assert (cause["effect"], cause["scope"]) == (effect, "rail")
     parameter = cause["parameters"][name]
     assert parameter["unit"] == unit and parameter["value"] == pytest.approx(value, rel=0.1)
-    if effect != "viscous_friction":  # too high by 1.5 %, by more than its interval, in 8 of 10 draws of noise
-        assert parameter["low"] < value < parameter["high"]
     entry = findings.effects[effect][0]
     assert entry["joints"] == "rail" and entry[name] == pytest.approx(parameter["value"], rel=1e-3)
+
+
+TOO_NARROW = pytest.mark.xfail(strict=True, reason="too high by 1.5 %, beyond its interval, in 8 of 10 draws of noise")
+
+
+@pytest.mark.parametrize(
+    "effect", [pytest.param(name, marks=[TOO_NARROW] * (name == "viscous_friction")) for name in CAUSES]
+)
+def test_an_interval_holds_what_is_true(effect: str) -> None:
+    parameters, name, value, _ = CAUSES[effect]
+    (cause,) = document(found(effect, **parameters))["causes"]
+    assert cause["parameters"][name]["low"] < value < cause["parameters"][name]["high"]
 
 
 def test_the_report_is_in_metres_and_newtons() -> None:

@@ -135,6 +135,19 @@ def test_the_aims_of_table_2_stand_beside_its_trials() -> None:
         assert spent == f"{summary.real_episodes:.0f}"
 
 
+def test_what_gains_no_more_in_table_2_is_as_its_trials_say() -> None:
+    ten = trials_of("table2")
+    whole = (ROOT / "docs/results/table2.md").read_text(encoding="utf-8")
+    _, (_, *places, _), rows = next(table for table in tables(whole) if table[1][0] == "not above")
+    assert [row[0].strip("`") for row in rows] == ["sgat", "identified", "randomised", "effects_sgat"]
+    for method, *gains, _ in rows:
+        for place, gain in zip(places, gains, strict=True):
+            world = place.split("`")[1]
+            (summary,) = summaries([each for each in ten if (each.world, each.method) == (world, method.strip("`"))])
+            assert summary.improvement is not None
+            assert gain == f"{summary.improvement.mean:.1f} ({bounds(summary.improvement)})"
+
+
 def test_the_guide_tells_gains_and_falls_of_the_trials() -> None:
     """Of a policy that was returned, and of those that were tried."""
     guide = (ROOT / "docs/explanation/grounding.md").read_text(encoding="utf-8")

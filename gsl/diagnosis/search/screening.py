@@ -136,13 +136,13 @@ def _free_shifts(problem: Problem, base: Hypothesis, tried: Sequence[frozenset[t
     at, unit, spread = base.fit.shifts, problem.simulator.plant.robot.torque_unit, problem.simulator.spread
     best, most = None, problem.settings.hidden * problem.settings.gain
     for candidate in (part.on(scope) for part in problem.library if part.on_joints for scope in problem.scopes):
-        common = shares([candidate], problem.scopes, unit)
-        if len(common) != 1 or {*base.places, (candidate.effect, candidate.scope)} in tried:
+        common, place = shares([candidate], problem.scopes, unit), (candidate.effect, candidate.scope)
+        if len(common) != 1 or place in base.places or {*base.places, place} in tried:
             continue
         theta, left = hand_over(candidate.neutral, at, candidate.bounds, common)
         if (freed := prior_cost(at, spread) - prior_cost(left, spread)) > most:
             best, most = (candidate, theta, left), freed
-    if best is None or (best[0].effect, best[0].scope) in base.places:
+    if best is None:
         return []
     candidate, theta, left = best
     return [problem.fit((*base.candidates, candidate), np.r_[base.start, theta], left)]
