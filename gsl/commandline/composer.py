@@ -23,7 +23,7 @@ from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
 from gsl.commandline.config_errors import Vocabulary, misshapen, shapeless, translate, unfit, unknown_key, unreadable
-from gsl.commandline.known_settings import list_keys, plain, read_declared, read_parts
+from gsl.commandline.known_settings import REFERRED, is_idle, list_keys, plain, read_declared, read_parts
 from gsl.commandline.overrides import COMMAND_KEYS, NAMES, effect_path, file_of, key_of, rewrite
 from gsl.commandline.own_word import check_own_word, check_servos, find_own_modules, find_trust, keep_text
 from gsl.commandline.plugins import folders, packages
@@ -36,7 +36,6 @@ from gsl.core.validation import did_you_mean
 from gsl.effects.effect import names, withheld
 from gsl.errors import ConfigError, InputError
 
-REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
 LOGS = ("real", "reference")  # settings that name recorded trajectories
 LOGS_TOGETHER = "several logs are one folder of files"
 WHOLE = "iterate"  # the command, and the setting of others, that makes what a grounding refers to
@@ -189,7 +188,7 @@ def _check_referred(command: str, composition: Composition) -> None:
     typed = [key for key in map(key_of, composition.overrides) if key.startswith(REFERRED)]
     text = OmegaConf.to_yaml(composition.config) if typed else ""
     for key in typed:
-        if f"${{{key}}}" not in text:
+        if is_idle(key, text):
             last = key.rpartition(".")[2]
             there = [name for name in list_keys(composition.config) if not name.startswith(REFERRED)]
             others = [name for name in there if name.rpartition(".")[2] == last]

@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 
 from gsl.commandline.composer import compose, groups, open_hydra, options
 from gsl.commandline.config import WORKERS, CommandSettings, resolve
-from gsl.commandline.known_settings import plain, read_declared
+from gsl.commandline.known_settings import is_idle, plain, read_declared
 from gsl.commandline.overrides import EXECUTOR_KEYS, OPTIONAL_GROUPS
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
@@ -75,7 +75,7 @@ def explain(command: str, typed: Sequence[str] = (), *, config_dir: Path | None 
                 sections[group] = {
                     name: replace(about, meaning=notes.get(name, about.meaning))
                     for name, about in sections[group].items()
-                    if re.search(rf"\b{group}\.{name}\b", text)
+                    if not is_idle(f"{group}.{name}", text)
                 }
         if not any(WORKERS in settings for settings in sections.values()):
             sections[""] = {name: about for name, about in sections[""].items() if name not in EXECUTOR_KEYS}

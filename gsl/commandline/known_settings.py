@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -12,10 +13,18 @@ from gsl.core.setting import Setting, parts_of, settings_of
 from gsl.core.trust import TARGET, class_of
 from gsl.errors import ConfigError
 
+REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
+
+
+def is_idle(key: str, text: str) -> bool:
+    """Whether a key is of a recipe or a preset, and no setting of a configuration, as a text, refers to it."""
+    return key.startswith(REFERRED) and not re.search(rf"\b{re.escape(key)}\b", text)
+
 
 def list_keys(config: DictConfig) -> list[str]:
-    """Return every dotted key that can be set, those of the command included."""
-    return sorted({*COMMAND_KEYS, *_keys_below(config, "")})
+    """Return every dotted key that can be set and does something, those of the command included."""
+    text = OmegaConf.to_yaml(config)
+    return sorted(key for key in {*COMMAND_KEYS, *_keys_below(config, "")} if not is_idle(key, text))
 
 
 def read_declared(node: Mapping[str, Any]) -> Mapping[str, Setting]:

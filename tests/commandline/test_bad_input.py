@@ -27,7 +27,9 @@ ARM = "experiment=arm preset=toy grounding=gat"
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        ("collect episode=3", "episode: no such setting; did you mean episodes or preset.episodes?"),
+        ("collect episode=3", "episode: no such setting; did you mean episodes?"),
+        ("collect task=excite motion=3", "motion: no such setting; did you mean policy.motions?"),
+        ("collect preset.motion=3", "preset.motion: nothing in gsl collect refers to it here"),
         ("collect world.stp=0.1", "world.stp: no such setting; did you mean world.step"),
         (
             "collect task=walc",

@@ -69,6 +69,14 @@ def test_what_is_looked_at_begins_with_the_settings_of_the_command(capsys: pytes
     assert [*shown][-1] == "preset" and {"name", "episodes"} < {*shown}
 
 
+def test_a_value_of_a_preset_counts_where_a_setting_selects_it(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("GSL_CONFIG_DIR")
+    assert call(["optimize", "preset.screening=5", "--cfg", "job", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["screening"] == 5
+
+
 def test_an_experiment_is_a_whole_scenario(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["collect", "--cfg", "job", "--json", "experiment=long"]) == 0
     assert json.loads(capsys.readouterr().out)["episodes"] == 9
