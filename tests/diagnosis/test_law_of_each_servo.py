@@ -140,15 +140,25 @@ def test_dry_friction_of_a_joint_brakes_either_way_with_its_torque() -> None:
     assert list(form.x) == sorted(form.x)
 
 
-def test_where_joints_shake_or_replays_diverge_there_is_no_law() -> None:
+def test_where_all_joints_shake_or_replays_diverge_there_is_no_law() -> None:
     batch, still = arm_log(), no_shifts(2)
     assert learn_laws(batch, simulator(), {}, still) is not None
-    shaking = replace(batch.comparison, shaking=np.array([True, False]))
+    shaking = replace(batch.comparison, shaking=np.array([True, True]))
     assert learn_laws(replace(batch, comparison=shaking), simulator(), {}, still) is None
     nowhere = batch.pieces.windows._replace(motion=np.full_like(batch.pieces.windows.motion, np.nan))
     lost = replace(batch, pieces=replace(batch.pieces, windows=nowhere))
     assert learn_laws(lost, simulator(), {}, still) is None
     assert find_forms(replace(batch, comparison=shaking), simulator()) == ()
+
+
+def test_a_joint_that_shakes_has_no_law_and_the_others_have_theirs() -> None:
+    batch, still = arm_log(coulomb_friction={"torque": 0.3, "joints": "elbow"}), no_shifts(2)
+    first = replace(batch, comparison=replace(batch.comparison, shaking=np.array([True, False])))
+    laws = learn_laws(first, simulator(), {}, still)
+    assert laws is not None
+    assert laws.by_joint[0, 0] == 0.0 < laws.by_joint[1, 1]
+    assert [form.joint for form in find_forms(first, simulator())] == ["elbow"]
+    assert ceiling(first, simulator().simulate({}, still, first.pieces), laws) is None
 
 
 def test_the_ceiling_is_what_laws_leave_of_the_excess() -> None:

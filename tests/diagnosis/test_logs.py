@@ -134,3 +134,17 @@ def test_joints_that_shake_under_steps_do_not_pass_for_noise() -> None:
     assert list(np.flatnonzero(cut.noise.restless)) == list(np.flatnonzero(cut.comparison.shaking)) == [0]
     assert 0.7 * noise < cut.noise.sd[0] < 2.0 * noise < 0.6 * roughness(cut.records)[0]
     assert cut.noise.sd[1:3] == pytest.approx(roughness(cut.records)[1:3])
+
+
+def test_joints_that_shake_slowly_do_not_pass_for_a_gap() -> None:
+    """At 6 Hz a joint is no rougher than a calm one: it moves though its commands are smooth and explain nothing."""
+    rng, noise, time = np.random.default_rng(4), 1.5e-3, 0.02 * np.arange(901)
+    commands = REST + np.zeros((900, len(REST)))
+    triangle = 0.2 * (np.abs(np.mod(time[:-1], 3.0) - 1.5) - 0.75)
+    commands[:, :3] += np.stack([triangle, triangle, 0.2 * np.sin(2 * np.pi * 0.4 * time[:-1])], axis=1)
+    late = lfilter([0.0, 0.09], [1.0, -1.4, 0.49], np.vstack([commands[:1], commands]) - REST, axis=0) + REST
+    late[:, 1] = np.round(late[:, 1] / 0.004) * 0.004  # it sticks and slips
+    position = late + noise * rng.standard_normal(late.shape)
+    position[:, 0] += 0.008 * np.sin(2 * np.pi * 6.0 * time)
+    batch = Batch((Trajectory(time, commands, position, np.zeros_like(position)),), NAO.controlled, 0.02, {})
+    assert list(np.flatnonzero(cut_log(batch, NAO).comparison.shaking)) == [0]

@@ -12,6 +12,7 @@ from gsl.diagnosis.log.records import Record
 from gsl.diagnosis.log.repeats import Repeat, align_repeats
 from gsl.diagnosis.settings import FloorSettings
 
+STILL = 1e-5  # [rad]: what commands move by beside a parabola, when they are one
 BLOCK = 5  # ticks of the low pass that joints that shake are seen through: 0.1 s at 50 Hz
 
 
@@ -28,7 +29,7 @@ class NoiseFloor:
         resolution: Of the encoders [rad].
         samples: Independent numbers that it comes from, over all joints.
         white: Of white noise alone, from the quietest part of the spectrum [rad], shape (n_joints,).
-        restless: Joints that are rougher than that while their commands are smooth, shape (n_joints,).
+        restless: Joints that move by more than that without a cause in smooth commands, shape (n_joints,).
     """
 
     sd: np.ndarray
@@ -74,7 +75,8 @@ def noise_floor(
     white = np.maximum(white_level(records, how), least)
     restless = np.zeros(len(white), dtype=bool)
     if not least.ndim:  # in the air: steps shake a walking robot
-        restless = _find_restless(records, white, np.maximum(how.unwhite * white, resolution), how)
+        most = np.maximum(how.unwhite * white, resolution)
+        restless = _find_restless(records, white, most, how) | (_waver(records, white, how) > most)
     if groups:
         spread = [align_repeats(group, period)[:, how.settled :] for group in groups]
         square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
@@ -166,6 +168,36 @@ def _find_restless(records: Sequence[Record], white: np.ndarray, most: np.ndarra
         if still.sum() > how.settled:
             restless[joint] = np.mean(rough[still, joint]) > most[joint] ** 2
     return restless
+
+
+def _waver(records: Sequence[Record], white: np.ndarray, how: FloorSettings) -> np.ndarray:
+    """Return how far joints move about what smooth commands explain [rad], shape (n_channels,); 0 without such windows.
+
+    A window of a calm joint is a parabola and its own command, now and a little earlier, as far as noise goes.
+    """
+    length, left, n = how.wavering, [], len(white)
+    for record in records:
+        if len(record) < 2 * (how.settled + length):
+            continue
+        jerk = _jerk_of_commands(record, how.settled)[:, :n]
+        smooth = (jerk < how.smooth * white[: jerk.shape[1]] ** 2).all(axis=1)
+        first = len(record.position) - len(smooth)
+        for begin in range(0, len(smooth) - length + 1, length // 2):
+            if smooth[begin : begin + length].all():
+                t = first + begin
+                sent = np.stack([record.targets[t - 1 - late :][:length, :n] for late in how.late])
+                left.append(_unexplained(record.measured[t : t + length], sent))
+    return np.median(left, axis=0) if len(left) >= how.rests else np.zeros(n)
+
+
+def _unexplained(positions: np.ndarray, sent: np.ndarray) -> np.ndarray:
+    """Return the standard deviation about a parabola and commands, shape (n,), of shapes (T, n) and (lags, T, n)."""
+    parabola = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(positions)), 3))[0]
+    x, beside = (y - parabola @ (parabola.T @ y) for y in (positions.T[..., None], np.moveaxis(sent, (0, 2), (2, 0))))
+    basis, size, _ = np.linalg.svd(beside, full_matrices=False)
+    basis = basis * (size > STILL)[:, None]
+    left = x - basis @ (basis.swapaxes(1, 2) @ x)
+    return np.sqrt((left[..., 0] ** 2).sum(axis=1) / (len(positions) - 3 - (size > STILL).sum(axis=1)))
 
 
 def _jerk_of_commands(record: Record, ticks: int) -> np.ndarray:

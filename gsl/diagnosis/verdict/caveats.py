@@ -100,8 +100,8 @@ def _log(findings: Findings) -> Iterator[str]:
 
 def _ask_for_a_floor(findings: Findings) -> str:
     """Say how to get a better floor, and propose what even a law of each servo leaves as what does not matter."""
-    log, laws = findings.log, findings.laws
-    left = TOLERANCE if laws is None else float(np.sqrt(np.mean((laws.z * log.comparison.floor) ** 2)))
+    log, laws, calm = findings.log, findings.laws, ~findings.log.comparison.shaking
+    left = TOLERANCE if laws is None else float(np.sqrt(np.mean((laws.z * log.comparison.floor)[..., calm] ** 2)))
     twice = "" if log.noise.source == "repeats" else "record a motion twice, which measures the noise, or "
     return (
         f"What is left is far above the noise, so everything counts as an outlier: {twice}say with "

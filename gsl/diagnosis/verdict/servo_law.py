@@ -1,7 +1,8 @@
 """Servo laws: what any servo could explain of the gap that a hypothesis leaves, and which form that has.
 
 On top of a hypothesis every joint gets a law of its own, a sum of `servo_terms`. It is fitted to training windows with
-a ridge towards the servo that it stands on. Held-out windows say what it is worth, as they do of any hypothesis.
+a ridge towards the servo that it stands on. Held-out windows say what it is worth, as they do of any hypothesis. Joints
+that shake have none: a log does not carry their phase.
 """
 
 from __future__ import annotations
@@ -141,6 +142,7 @@ class _Fits:
         train, held: The replays.
         windows: Which windows are held out, shape (W,).
         folds: Of each training window, shape (W,).
+        calm: Indices of the joints that do not shake.
         settings: How.
     """
 
@@ -148,21 +150,21 @@ class _Fits:
     held: Replays
     windows: np.ndarray
     folds: np.ndarray
+    calm: np.ndarray
     settings: LawSettings
 
     @classmethod
     def of(cls, log: Log, simulator: Simulator, effects: Effects, shifts: np.ndarray, how: LawSettings) -> _Fits | None:
         """Replay a log by a simulator with effects and a calibration, if it can be."""
-        if log.walking or log.comparison.shaking.any():
-            return None
-        if len(log.train) < how.folds:
+        calm = np.flatnonzero(~log.comparison.shaking)
+        if log.walking or not len(calm) or len(log.train) < how.folds:
             return None
         windows = [spread(index, how.windows) for index in (log.train, log.held_out)]
         benches = [Bench(simulator, log.pieces.take(index), log.comparison) for index in windows]
         train, held = (replay(bench, effects, shifts, how.lags) for bench in benches)
         if train is None or held is None:
             return None
-        return cls(train, held, windows[1], np.arange(len(windows[0])) % how.folds, how)  # few motions are unlike
+        return cls(train, held, windows[1], np.arange(len(windows[0])) % how.folds, calm, how)  # few motions are unlike
 
     def joint(self, k: int) -> _Joint:
         """Return joint k."""
@@ -176,7 +178,7 @@ class _Fits:
 def learn_laws(
     log: Log, simulator: Simulator, effects: Effects, shifts: np.ndarray, settings: LawSettings | None = None
 ) -> Laws | None:
-    """Return the laws on top of a hypothesis; None where joints shake, a robot walks, or windows are few.
+    """Return the laws on top of a hypothesis; None where all joints shake, a robot walks, or windows are few.
 
     Args:
         log: Its training windows are fitted, the held-out ones scored.
@@ -192,7 +194,10 @@ def learn_laws(
 def _weigh(log: Log, fits: _Fits) -> Laws:
     """Return what laws save in the held-out windows of a log."""
     how = fits.settings
-    z = np.stack([joint.left(joint.fit()) for joint in map(fits.joint, range(len(log.joints)))], axis=2)
+    z = fits.held.z.copy()
+    for k in fits.calm:
+        joint = fits.joint(int(k))
+        z[..., k] = joint.left(joint.fit())
     saved, sample = loss(fits.held.z) - loss(z), log.pieces.take(fits.windows).samples
     sums = np.array([saved[sample == k].sum(axis=(0, 1)) for k in np.unique(sample)])
     index = np.random.default_rng(0).integers(0, len(sums), (how.samples, len(sums)))

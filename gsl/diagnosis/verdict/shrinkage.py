@@ -110,14 +110,14 @@ def _by_regime(findings: Findings, z: Mapping[str, np.ndarray]) -> list[dict[str
 
 
 def ceiling(log: Log, before: np.ndarray, laws: Laws | None) -> float | None:
-    """Return the share of the held-out excess that goes with a law of each servo; None without laws or an excess.
+    """Return the share of the held-out excess that goes with a law of each servo; None without an excess or a law.
 
     Args:
         log: The log.
         before: Replays of all windows by the simulator as it was [rad], shape (W, T, n_joints).
         laws: On top of the best hypothesis.
     """
-    if laws is None or not np.isfinite(before).all():
+    if laws is None or log.comparison.shaking.any() or not np.isfinite(before).all():
         return None
     used = log.used
     was = _excess(np.clip(log.residual(before)[laws.windows], -CLIP, CLIP), used)
