@@ -76,7 +76,7 @@ def noise_floor(
     restless = np.zeros(len(white), dtype=bool)
     if not least.ndim:  # in the air: steps shake a walking robot
         most = np.maximum(how.unwhite * white, resolution)
-        restless = _find_restless(records, white, most, how) | (_waver(records, white, how) > most)
+        restless = _find_restless(records, white, most, how) | (_measure_wavering(records, white, how) > most)
     if groups:
         spread = [align_repeats(group, period)[:, how.settled :] for group in groups]
         square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
@@ -170,27 +170,29 @@ def _find_restless(records: Sequence[Record], white: np.ndarray, most: np.ndarra
     return restless
 
 
-def _waver(records: Sequence[Record], white: np.ndarray, how: FloorSettings) -> np.ndarray:
+def _measure_wavering(records: Sequence[Record], white: np.ndarray, how: FloorSettings) -> np.ndarray:
     """Return how far joints move about what smooth commands explain [rad], shape (n_channels,); 0 without such windows.
 
-    A window of a calm joint is a parabola and its own command, now and a little earlier, as far as noise goes.
+    A window of a calm joint is a parabola and its own command, now and a little earlier, as far as noise goes: no
+    command of any joint has turned round for a while, which friction and play would answer.
     """
     length, left, n = how.wavering, [], len(white)
     for record in records:
         if len(record) < 2 * (how.settled + length):
             continue
         jerk = _jerk_of_commands(record, how.settled)[:, :n]
-        smooth = (jerk < how.smooth * white[: jerk.shape[1]] ** 2).all(axis=1)
-        first = len(record.position) - len(smooth)
-        for begin in range(0, len(smooth) - length + 1, length // 2):
-            if smooth[begin : begin + length].all():
-                t = first + begin
-                sent = np.stack([record.targets[t - 1 - late :][:length, :n] for late in how.late])
-                left.append(_unexplained(record.measured[t : t + length], sent))
+        smooth = np.all(jerk < how.smooth * white[: jerk.shape[1]] ** 2, axis=1)
+        first, targets = len(record.position) - len(smooth), record.targets[:, :n]
+        for t in range(first, len(record.position) - length + 1, length // 2):
+            way = np.diff(targets[t - 1 - how.settled : t - 1 + length], axis=0)
+            onward = np.all(way >= 0.0, axis=0) | np.all(way <= 0.0, axis=0)
+            if np.all(onward) and np.all(smooth[t - first : t - first + length]):
+                sent = np.stack([targets[t - 1 - late :][:length] for late in how.late])
+                left.append(_leave_unexplained(record.measured[t : t + length], sent))
     return np.median(left, axis=0) if len(left) >= how.rests else np.zeros(n)
 
 
-def _unexplained(positions: np.ndarray, sent: np.ndarray) -> np.ndarray:
+def _leave_unexplained(positions: np.ndarray, sent: np.ndarray) -> np.ndarray:
     """Return the standard deviation about a parabola and commands, shape (n,), of shapes (T, n) and (lags, T, n)."""
     parabola = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(positions)), 3))[0]
     x, beside = (y - parabola @ (parabola.T @ y) for y in (positions.T[..., None], np.moveaxis(sent, (0, 2), (2, 0))))
