@@ -178,8 +178,8 @@ def _measure_wavering(records: Sequence[Record], white: np.ndarray, how: FloorSe
     """
     length, left, n = how.wavering, [], len(white)
     for record in records:
-        if len(record) < 2 * (how.settled + length):
-            continue
+        if record.beside is not None or len(record) < 2 * (how.settled + length):
+            continue  # what comes beside positions moves a joint as well
         jerk = _jerk_of_commands(record, how.settled)[:, :n]
         smooth = np.all(jerk < how.smooth * white[: jerk.shape[1]] ** 2, axis=1)
         first, targets = len(record.position) - len(smooth), record.targets[:, :n]
