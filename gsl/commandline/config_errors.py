@@ -11,10 +11,10 @@ from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.errors import HydraException, MissingConfigException
-from omegaconf import DictConfig
+from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import InterpolationToMissingValueError, MissingMandatoryValue
 
-from gsl.commandline.known_settings import list_keys
+from gsl.commandline.known_settings import is_idle, list_keys
 from gsl.commandline.overrides import COMMAND_KEYS, FILE_GROUPS, OPTIONAL_GROUPS
 from gsl.core.validation import NO_SUCH, did_you_mean
 from gsl.errors import ConfigError, InputError
@@ -166,7 +166,8 @@ def _no_such_setting(key: str, words: Vocabulary) -> ConfigError:
     roles = [choice.partition("@")[2] for choice in words.chosen if choice.startswith(f"{key}@")]
     if roles:
         return ConfigError(key, f"has a role here; say {' or '.join(f'{role}=...' for role in roles)}")
-    keys, last = list_keys(words.config), key.rpartition(".")[2]
+    text, last = OmegaConf.to_yaml(words.config), key.rpartition(".")[2]
+    keys = [declared for declared in list_keys(words.config) if not is_idle(declared, text)]
     deeper = [declared for declared in keys if declared.rpartition(".")[2] == last]
     if deeper:
         return ConfigError(key, f"no such setting; did you mean {' or '.join(deeper[:3])}?")

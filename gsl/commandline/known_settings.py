@@ -18,13 +18,12 @@ REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
 
 def is_idle(key: str, text: str) -> bool:
     """Whether a key is of a recipe or a preset, and no setting of a configuration, as a text, refers to it."""
-    return key.startswith(REFERRED) and not re.search(rf"\b{re.escape(key)}\b", text)
+    return key.startswith(REFERRED) and not re.search(rf"\$\{{[^}}]*\b{re.escape(key)}\b", text)
 
 
 def list_keys(config: DictConfig) -> list[str]:
-    """Return every dotted key that can be set and does something, those of the command included."""
-    text = OmegaConf.to_yaml(config)
-    return sorted(key for key in {*COMMAND_KEYS, *_keys_below(config, "")} if not is_idle(key, text))
+    """Return every dotted key that can be set, those of the command included."""
+    return sorted({*COMMAND_KEYS, *_keys_below(config, "")})
 
 
 def read_declared(node: Mapping[str, Any]) -> Mapping[str, Setting]:

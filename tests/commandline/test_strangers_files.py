@@ -537,3 +537,8 @@ def test_a_world_of_a_stranger_takes_a_servo_of_its_own_place_or_the_users_alone
         assert problem in refused(*words, *typed, folder=here), (servo, typed)
     world.with_name("v.yaml").write_text("defaults: [learned, _self_]\nservo: ../elsewhere\n")
     assert out in "".join(gsl(*words[:2], "--multirun", "world=nao_ideal,v", *SMALL, folder=here).lines)
+    experiment = here / "theirs/experiment/e.yaml"  # a grounding that hides among the values of a preset
+    experiment.parent.mkdir()
+    hidden = "preset: {g: {_target_: gsl.grounding.servo.LearnedServo, servo: ../elsewhere}}"
+    experiment.write_text(f"# @package _global_\n{hidden}\ngrounding: ${{preset.g}}\n")
+    assert out in refused("optimize", words[1], "experiment=e", folder=here)

@@ -1,6 +1,6 @@
 """Logs that cannot be diagnosed are refused in one line that says what, where and what to do."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 
@@ -136,15 +136,92 @@ def test_joints_that_shake_under_steps_do_not_pass_for_noise() -> None:
     assert cut.noise.sd[1:3] == pytest.approx(roughness(cut.records)[1:3])
 
 
+LATE = ([0.0, 0.09], [1.0, -1.4, 0.49])  # how a joint follows, as a filter
+
+
+def straight_on(
+    more: Callable[[np.ndarray, np.ndarray, np.ndarray], None],
+    sensors: Mapping[str, np.ndarray] | None = None,
+    noise: float = 1.5e-3,
+    seeds: tuple[int, ...] = (4,),
+) -> list[int]:
+    """Return which joints shake in logs of slow triangles and a wave, to which `more` adds something."""
+    time, episodes = 0.02 * np.arange(901), []
+    for seed in seeds:
+        commands = REST + np.zeros((900, len(REST)))
+        triangle = 0.2 * (np.abs(np.mod(time[:-1], 3.0) - 1.5) - 0.75)
+        commands[:, :3] += np.stack([triangle, triangle, 0.2 * np.sin(2 * np.pi * 0.4 * time[:-1])], axis=1)
+        position = lfilter(*LATE, np.vstack([commands[:1], commands]) - REST, axis=0) + REST
+        more(time + 0.05 * seed, commands, position)
+        position += noise * np.random.default_rng(seed).standard_normal(position.shape)
+        episodes.append(Trajectory(time, commands, position, np.zeros_like(position), sensors=dict(sensors or {})))
+    return list(np.flatnonzero(cut_log(Batch(tuple(episodes), NAO.controlled, 0.02, {}), NAO).comparison.shaking))
+
+
+def swing(time: np.ndarray, _: np.ndarray, position: np.ndarray) -> None:
+    position[:, 0] += 0.008 * np.sin(2 * np.pi * 6.0 * time)
+
+
 def test_joints_that_shake_slowly_do_not_pass_for_a_gap() -> None:
     """At 6 Hz a joint is no rougher than a calm one: it moves though its commands are smooth and explain nothing."""
-    rng, noise, time = np.random.default_rng(4), 1.5e-3, 0.02 * np.arange(901)
-    commands = REST + np.zeros((900, len(REST)))
-    triangle = 0.2 * (np.abs(np.mod(time[:-1], 3.0) - 1.5) - 0.75)
-    commands[:, :3] += np.stack([triangle, triangle, 0.2 * np.sin(2 * np.pi * 0.4 * time[:-1])], axis=1)
-    late = lfilter([0.0, 0.09], [1.0, -1.4, 0.49], np.vstack([commands[:1], commands]) - REST, axis=0) + REST
-    late[:, 1] = np.round(late[:, 1] / 0.004) * 0.004  # it sticks and slips
-    position = late + noise * rng.standard_normal(late.shape)
-    position[:, 0] += 0.008 * np.sin(2 * np.pi * 6.0 * time)
-    batch = Batch((Trajectory(time, commands, position, np.zeros_like(position)),), NAO.controlled, 0.02, {})
-    assert list(np.flatnonzero(cut_log(batch, NAO).comparison.shaking)) == [0]
+    assert straight_on(swing) == [0]
+    assert straight_on(swing, seeds=(4, 5)) == [0]  # another phase each time
+
+
+def test_what_repeats_is_no_shaking() -> None:
+    assert straight_on(lambda time, *rest: swing(time - time[0], *rest), seeds=(4, 5)) == []
+
+
+def test_a_joint_without_torque_does_not_shake() -> None:
+    def sway(time: np.ndarray, _: np.ndarray, position: np.ndarray) -> None:
+        position[300:, 0] += 0.02 * np.sin(2 * np.pi * 3.0 * time[300:])
+
+    on = {f"enabled.{joint}": np.where(np.arange(901) < 300, 1.0, 0.0) for joint in NAO.controlled}
+    assert straight_on(sway) == [0]
+    assert straight_on(sway, on) == []
+
+
+def bend(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
+    """Let a joint be late on a command that is no parabola."""
+    commands[:, 2] = REST[2] + 0.6 * np.sin(2 * np.pi * 0.4 * time[:-1])
+    position[:, 2] = lfilter(*LATE, commands[[0, *range(900)], 2] - REST[2]) + REST[2]
+
+
+def stick(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
+    position[:, 1] = np.round(position[:, 1] / 0.004) * 0.004
+
+
+def loosen(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
+    """Let a joint lag by a dead band of 0.06 rad, which it crosses wherever its command turns round."""
+    commands[:, 2] = REST[2] + 0.2 * np.sin(2 * np.pi * 0.8 * time[:-1])
+    at = REST[2]
+    for t, wanted in enumerate(commands[[0, *range(900)], 2]):
+        at = position[t, 2] = np.clip(at, wanted - 0.03, wanted + 0.03)
+
+
+def push(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
+    position[:, 3] += 0.05 * np.exp(-(((np.arange(901) - 420.0) / 8.0) ** 2))
+
+
+def climb(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
+    """Step up and up, each step before the last one has been answered."""
+    commands[:] = REST
+    commands[:, 0] += 0.1 * (np.arange(900) // 26)
+    position[:] = lfilter(*LATE, np.vstack([commands[:1], commands]) - REST, axis=0) + REST
+
+
+def ring(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
+    """Let a joint swing after each of its steps; others rest."""
+    since = np.mod(np.arange(901), 60)
+    commands[:] = REST
+    commands[:, 0] += 0.1 * (np.arange(900) // 60 % 2)
+    position[:] = np.vstack([commands[:1], commands])
+    position[:, 0] += 0.1 * np.exp(-since / 6.0) * np.cos(0.5 * since)
+
+
+@pytest.mark.parametrize(
+    ("more", "noise"),
+    [(bend, 2e-4), (stick, 1.5e-3), (loosen, 2e-4), (push, 1.5e-3), (climb, 1.5e-3), (ring, 1.5e-3)],
+)
+def test_a_calm_joint_does_not_shake(more: Callable[[np.ndarray, np.ndarray, np.ndarray], None], noise: float) -> None:
+    assert straight_on(more, noise=noise) == []

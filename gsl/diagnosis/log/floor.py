@@ -29,7 +29,7 @@ class NoiseFloor:
         resolution: Of the encoders [rad].
         samples: Independent numbers that it comes from, over all joints.
         white: Of white noise alone, from the quietest part of the spectrum [rad], shape (n_joints,).
-        restless: Joints that move by more than that without a cause in smooth commands, shape (n_joints,).
+        restless: Joints that move by much more than that, though commands are smooth, shape (n_joints,).
     """
 
     sd: np.ndarray
@@ -73,10 +73,10 @@ def noise_floor(
     least = np.array(max(resolution / np.sqrt(12.0), 1e-5)) if least is None else least
     groups = [group for group in _group(records, repeats, held, how) if len(group) > 1]
     white = np.maximum(white_level(records, how), least)
-    restless = np.zeros(len(white), dtype=bool)
+    restless = wavers = np.zeros(len(white), dtype=bool)
     if not least.ndim:  # in the air: steps shake a walking robot
-        most = np.maximum(how.unwhite * white, resolution)
-        restless = _find_restless(records, white, most, how) | (_measure_wavering(records, white, how) > most)
+        wavers = _measure_wavering(records, white, period, how) > np.maximum(how.unsteadily * white, resolution)
+        restless = _find_restless(records, white, np.maximum(how.unwhite * white, resolution), how)
     if groups:
         spread = [align_repeats(group, period)[:, how.settled :] for group in groups]
         square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
@@ -85,8 +85,10 @@ def noise_floor(
         sd = np.maximum(np.sqrt(square), least)
         usual = np.inf if least.ndim else float(np.median(sd))
         unsteady = sd > how.unsteady * usual
+        restless |= wavers & (sd > how.unsteadily * white)  # what repeats as well shakes by no chance
         sd = np.where(unsteady, usual, sd)
         return NoiseFloor(sd, np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples, white, restless)
+    restless |= wavers
     rough = roughness(records, how.quiet)
     sd = np.maximum(np.where(restless, np.minimum(rough, white), rough), least)
     calm = np.zeros(len(sd), dtype=bool)
@@ -170,36 +172,48 @@ def _find_restless(records: Sequence[Record], white: np.ndarray, most: np.ndarra
     return restless
 
 
-def _measure_wavering(records: Sequence[Record], white: np.ndarray, how: FloorSettings) -> np.ndarray:
+def _measure_wavering(records: Sequence[Record], white: np.ndarray, period: float, how: FloorSettings) -> np.ndarray:
     """Return how far joints move about what smooth commands explain [rad], shape (n_channels,); 0 without such windows.
 
-    A window of a calm joint is a parabola and its own command, now and a little earlier, as far as noise goes: no
+    A window of a calm joint is a parabola and its own command, now and a little earlier, as far as noise goes. No
     command of any joint has turned round for a while, which friction and play would answer.
     """
-    length, left, n = how.wavering, [], len(white)
+    ticks = max(1, round(how.tick / period))  # of a fast log, that make one of 50 Hz
+    length, settled, n, windows = how.wavering * ticks, how.settled * ticks, len(white), []
     for record in records:
-        if record.beside is not None or len(record) < 2 * (how.settled + length):
+        if record.beside is not None or len(record) < 2 * (settled + length):
             continue  # what comes beside positions moves a joint as well
         jerk = _jerk_of_commands(record, how.settled)[:, :n]
         smooth = np.all(jerk < how.smooth * white[: jerk.shape[1]] ** 2, axis=1)
         first, targets = len(record.position) - len(smooth), record.targets[:, :n]
-        for t in range(first, len(record.position) - length + 1, length // 2):
-            way = np.diff(targets[t - 1 - how.settled : t - 1 + length], axis=0)
+        for t in range(settled + how.late[-1] * ticks + 1, len(record.position) - length + 1, length):
+            way = np.diff(targets[t - 1 - settled : t - 1 + length], axis=0)
             onward = np.all(way >= 0.0, axis=0) | np.all(way <= 0.0, axis=0)
-            if np.all(onward) and np.all(smooth[t - first : t - first + length]):
-                sent = np.stack([targets[t - 1 - late :][:length] for late in how.late])
-                left.append(_leave_unexplained(record.measured[t : t + length], sent))
-    return np.median(left, axis=0) if len(left) >= how.rests else np.zeros(n)
+            driven = record.driven[t - 1 - settled : t + length] > 0.0
+            calm = smooth[max(0, t - first - settled + how.settled) : t - first + length]
+            if np.all(onward) and np.all(driven) and np.all(calm):
+                sent = np.stack([targets[t - 1 - late * ticks :][:length] for late in how.late])
+                windows.append((record.measured[t : t + length], sent))
+    left = [_leave_unexplained(*window) for window in windows[:: max(1, len(windows) // how.windows)]]
+    return np.median(left, axis=0) if len(left) >= how.least else np.zeros(n)
 
 
 def _leave_unexplained(positions: np.ndarray, sent: np.ndarray) -> np.ndarray:
-    """Return the standard deviation about a parabola and commands, shape (n,), of shapes (T, n) and (lags, T, n)."""
+    """Return the standard deviation about a parabola and commands in the calmer half of a window, shape (n,).
+
+    What rings after a step is calm later on; what shakes goes on.
+
+    Args:
+        positions: Shape (T, n).
+        sent: Commands, each some ticks older, shape (lags, T, n).
+    """
     parabola = np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, len(positions)), 3))[0]
     x, beside = (y - parabola @ (parabola.T @ y) for y in (positions.T[..., None], np.moveaxis(sent, (0, 2), (2, 0))))
     basis, size, _ = np.linalg.svd(beside, full_matrices=False)
     basis = basis * (size > STILL)[:, None]
-    left = x - basis @ (basis.swapaxes(1, 2) @ x)
-    return np.sqrt((left[..., 0] ** 2).sum(axis=1) / (len(positions) - 3 - (size > STILL).sum(axis=1)))
+    left = (x - basis @ (basis.swapaxes(1, 2) @ x))[..., 0]
+    free = 1.0 - (3 + (size > STILL).sum(axis=1)) / len(positions)
+    return np.sqrt(np.min([(half**2).mean(axis=1) for half in np.array_split(left, 2, axis=1)], axis=0) / free)
 
 
 def _jerk_of_commands(record: Record, ticks: int) -> np.ndarray:

@@ -40,7 +40,7 @@ class Laws:
     Attributes:
         windows: Which ones of the log, shape (W,).
         z: Residuals that are left there [floors], shape (W, scored, n_joints).
-        gain: Cost of one residual that laws save, over all joints, and lower end of its 95 % interval, shape (2,).
+        gain: Cost of one residual that laws save, over joints that have one, with its lower end at 95 %, shape (2,).
         by_joint: The same of each joint, the lower ends such that all hold together, shape (2, n_joints).
         settings: What is of material size.
     """
@@ -202,8 +202,8 @@ def _weigh(log: Log, fits: _Fits) -> Laws:
     sums = np.array([saved[sample == k].sum(axis=(0, 1)) for k in np.unique(sample)])
     index = np.random.default_rng(0).integers(0, len(sums), (how.samples, len(sums)))
     drawn, mean = sums[index].sum(axis=1) / saved[..., 0].size, saved.mean(axis=(0, 1))
-    gain = np.array([mean.mean(), np.quantile(drawn.mean(axis=1), TAIL)])
-    return Laws(fits.windows, z, gain, np.array([mean, np.quantile(drawn, TAIL / len(mean), axis=0)]), how)
+    gain = np.array([mean[fits.calm].mean(), np.quantile(drawn[:, fits.calm].mean(axis=1), TAIL)])
+    return Laws(fits.windows, z, gain, np.array([mean, np.quantile(drawn, TAIL / len(fits.calm), axis=0)]), how)
 
 
 def find_forms(log: Log, simulator: Simulator, settings: LawSettings | None = None) -> tuple[Form, ...]:

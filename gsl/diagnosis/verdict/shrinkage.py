@@ -110,7 +110,7 @@ def _by_regime(findings: Findings, z: Mapping[str, np.ndarray]) -> list[dict[str
 
 
 def ceiling(log: Log, before: np.ndarray, laws: Laws | None) -> float | None:
-    """Return the share of the held-out excess that goes with a law of each servo; None without an excess or a law.
+    """Return the share of the held-out excess that goes with a law of each servo, None without an excess or a law.
 
     Args:
         log: The log.
