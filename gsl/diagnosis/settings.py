@@ -28,12 +28,14 @@ class FloorSettings:
     quietest: float = 0.2  # share of the windows and frequencies that noise alone fills
     smooth: float = 0.25  # share of white noise's power below which a command's own roughness does not count
     unwhite: float = 1.5  # times white noise that is none. Measured: up to 1.1 on calm joints, up to 9 on shaking ones
-    tick: float = 0.02  # [s], of the numbers of ticks in the next two lines
+    tick: float = 0.02  # [s], of `settled` and of the next two lines where slow shaking is looked for in a faster log
     wavering: int = 24  # ticks of smooth commands over which a joint that shakes slowly swings: 0.5 s
     late: tuple[int, ...] = (0, 2, 4)  # ticks by which a joint follows its command
     least: int = 3  # such windows that it takes to judge
     windows: int = 200  # of these that are looked at, spread over the log
-    unsteadily: float = 1.5  # times white noise. Measured: up to 1.3 on calm joints, 1.3 to 12 on shaking ones
+    unsteadily: float = (
+        1.5  # times white noise. Measured: up to 1.1 on calm joints, 3.4 with cogging, 12 on shaking ones
+    )
     unmeasured: float = 3.0  # encoder steps that are the floor where every joint shakes
 
 
