@@ -12,7 +12,7 @@ from omegaconf import OmegaConf
 
 from gsl.commandline.composer import compose, groups, open_hydra, options
 from gsl.commandline.config import WORKERS, CommandSettings, resolve
-from gsl.commandline.known_settings import is_idle, plain, read_declared
+from gsl.commandline.known_settings import REFERRED_GROUPS, is_idle, plain, read_declared
 from gsl.commandline.overrides import EXECUTOR_KEYS, OPTIONAL_GROUPS
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
@@ -22,7 +22,6 @@ from gsl.effects.effect import effect_class, names
 from gsl.errors import ConfigError, GslError
 
 WIDEST = 34
-REFERRED_GROUPS = ("preset", "recipe")  # values without a class, to which settings refer
 NOTE = re.compile(r"(\w+):[^#]*#\s*(.+)")
 
 

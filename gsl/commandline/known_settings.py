@@ -13,7 +13,8 @@ from gsl.core.setting import Setting, parts_of, settings_of
 from gsl.core.trust import TARGET, class_of
 from gsl.errors import ConfigError
 
-REFERRED = ("preset.", "recipe.")  # groups of values to which settings refer
+REFERRED_GROUPS = ("preset", "recipe")  # values without a class, to which settings refer
+REFERRED = tuple(f"{group}." for group in REFERRED_GROUPS)
 
 
 def is_idle(key: str, text: str) -> bool:

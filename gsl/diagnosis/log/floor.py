@@ -185,20 +185,19 @@ def _measure_wavering(records: Sequence[Record], white: np.ndarray, period: floa
             continue  # what comes beside positions moves a joint as well
         jerk = _jerk_of_commands(record, how.settled)[:, :n]
         smooth = np.all(jerk < how.smooth * white[: jerk.shape[1]] ** 2, axis=1)
-        first, targets = len(record.position) - len(smooth), record.targets[:, :n]
+        first, targets, on = len(record.position) - len(smooth), record.targets[:, :n], record.driven > 0.0
         for t in range(settled + how.late[-1] * ticks + 1, len(record.position) - length + 1, length):
             way = np.diff(targets[t - 1 - settled : t - 1 + length], axis=0)
             onward = np.all(way >= 0.0, axis=0) | np.all(way <= 0.0, axis=0)
-            driven = record.driven[t - 1 - settled : t + length] > 0.0
             calm = smooth[max(0, t - first - settled + how.settled) : t - first + length]
-            if np.all(onward) and np.all(driven) and np.all(calm):
+            if np.all(onward) and np.all(calm) and np.all(on[t - 1 - settled : t + length]):
                 sent = np.stack([targets[t - 1 - late * ticks :][:length] for late in how.late])
                 windows.append((record.measured[t : t + length], sent))
-    left = [_leave_unexplained(*window) for window in windows[:: max(1, len(windows) // how.windows)]]
+    left = [_measure_remainder(*window) for window in windows[:: max(1, len(windows) // how.windows)]]
     return np.median(left, axis=0) if len(left) >= how.least else np.zeros(n)
 
 
-def _leave_unexplained(positions: np.ndarray, sent: np.ndarray) -> np.ndarray:
+def _measure_remainder(positions: np.ndarray, sent: np.ndarray) -> np.ndarray:
     """Return the standard deviation about a parabola and commands in the calmer half of a window, shape (n,).
 
     What rings after a step is calm later on; what shakes goes on.
