@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import logging
-import os
 import pickle
 import queue
 import socket
-import sys
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,6 +17,7 @@ from typing import Any
 from gsl.core.interruption import processes_starting
 from gsl.core.own_code import name_failures
 from gsl.errors import GslError
+from gsl.rollout.place import Place
 from gsl.storage.hashing import sources_hash
 
 CONNECT = 4.0  # [s] in which a scheduler has to answer
@@ -46,7 +45,7 @@ class Cluster:
         """
         with self._loss():
             client = self._connect(workers)
-            here = os.getcwd(), os.getcwd() in sys.path, sources_hash()
+            here = Place.here(), sources_hash()
             shared = client.submit(bytes, frozen, pure=False)  # a result, which dask makes anew when its holder dies
             futures = {
                 client.submit(_run, pickle.dumps((function, job)), shared, *here, pure=False): index
@@ -165,16 +164,13 @@ def find_cluster() -> Cluster | None:
     return _chosen.get()
 
 
-def _run(work: bytes, frozen: bytes, folder: str, own: bool, sources: str) -> bytes:
-    """Do one job on a worker as it would be done in `folder`; return what it came to and how it failed, pickled."""
+def _run(work: bytes, frozen: bytes, place: Place, sources: str) -> bytes:
+    """Do one job on a worker as it would be done in a place; return what it came to and how it failed, pickled."""
     with _alone:
         try:
             if sources_hash() != sources:
                 raise GslError(f"worker on {socket.gethostname()}: has another gsl; install the same on all machines")
-            if os.path.isdir(folder):
-                os.chdir(folder)
-            if own and folder not in sys.path:
-                sys.path.append(folder)
+            place.enter()
             with name_failures():
                 function, job = pickle.loads(work)  # noqa: S301  our own bytes, from whoever started the command
                 return pickle.dumps((function(frozen, job), None))

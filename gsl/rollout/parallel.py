@@ -10,6 +10,7 @@ import os
 import pickle
 import threading
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
 from gsl.errors import GslError
 from gsl.rollout.cluster import find_cluster
+from gsl.rollout.place import Place
 from gsl.rollout.rollout import Scenario, rollout
 
 TRIES = 5  # deaths of workers in a row, without a job done between, after which it is given up
@@ -143,7 +145,8 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
     parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **more)
     try:
         with processes_starting():
-            results = parallel(joblib.delayed(_run_numbered)(function, frozen, jobs[index], index) for index in missing)
+            run = joblib.delayed(partial(_run_numbered, function, frozen, Place.here()))
+            results = parallel(run(jobs[index], index) for index in missing)
         yield from results
     except TerminatedWorkerError:
         return
@@ -154,7 +157,8 @@ def _begin_worker(parent: int, marks: str) -> None:
     report_to(marks)
 
 
-def _run_numbered(function: Any, frozen: bytes, job: Any, index: int) -> tuple[int, Any]:
+def _run_numbered(function: Any, frozen: bytes, place: Place, job: Any, index: int) -> tuple[int, Any]:
+    place.enter()
     with name_failures():
         return index, function(frozen, job)
 
