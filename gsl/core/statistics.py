@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-import scipy
+import scipy  # scipy.stats takes longer to load than most commands run: only what needs it asks for it
 
 
 class Interval(NamedTuple):
@@ -53,7 +53,7 @@ def difference_interval(
 
 def wilson(hits: int, count: int, *, confidence: float = 0.95) -> Interval:
     """Return the share of hits with Wilson's score interval (Wilson 1927)."""
-    z, share = scipy.stats.norm.ppf(0.5 + confidence / 2), hits / count
+    z, share = scipy.special.ndtri(0.5 + confidence / 2), hits / count
     centre = (share + z**2 / (2 * count)) / (1.0 + z**2 / count)
     half = z / (1.0 + z**2 / count) * np.sqrt(share * (1.0 - share) / count + z**2 / (4 * count**2))
     return Interval(share, float(max(0.0, centre - half)), float(min(1.0, centre + half)))
@@ -113,5 +113,5 @@ def bootstrap_interval(
 def _t_interval(mean: float, variance_of_mean: float, freedom: float, confidence: float) -> Interval:
     if not np.isfinite(variance_of_mean):
         return Interval(float(mean), -np.inf, np.inf)
-    half = scipy.stats.t.ppf(0.5 + confidence / 2, freedom) * np.sqrt(variance_of_mean)
+    half = scipy.special.stdtrit(freedom, 0.5 + confidence / 2) * np.sqrt(variance_of_mean)
     return Interval(float(mean), float(mean - half), float(mean + half))

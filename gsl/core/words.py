@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+
+MANY = 6  # effects, more of which are counted and not named
 
 
 def significant(value: float, *, sign: bool = False, size: float | None = None) -> str:
@@ -45,3 +48,9 @@ def size(count: int) -> str:
     if count < 10_000:
         return f"{count:,} B"
     return f"{count / 1e3:,.0f} kB" if count < 10_000_000 else f"{count / 1e6:,.0f} MB"
+
+
+def name_effects(effects: Sequence[str]) -> str:
+    """Return effects by name, or only how many they are."""
+    names = tuple(dict.fromkeys(effects))
+    return ", ".join(names) if len(names) <= MANY else f"{len(names)} effects"

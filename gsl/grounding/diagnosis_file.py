@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
 from gsl.core.other_commands import gains_of
+from gsl.core.words import name_effects
 from gsl.effects.effect import build, together
 from gsl.errors import ArtifactError
 from gsl.grounding.draws import UncertainCause
@@ -15,7 +16,6 @@ from gsl.storage.diagnosis_report import DIGITS, report_of
 from gsl.storage.documents import as_written
 from gsl.storage.references import load
 
-MANY = 6  # effects, more of which are counted and not named
 DOUBT = "In the task that may be no nearer: compare with grounding=ane and grounding=gat."  # docs/results/withheld.md
 
 
@@ -50,13 +50,7 @@ class Diagnosis:
         if not self.causes:
             kept = "Nothing is switched on: the simulator is taken as it is, calibrated joint by joint."
             return f"{kept} {DOUBT}" if self.verdict == "unknown" else kept
-        return f"Switched on in the simulator: {name_causes(self.causes)}."
-
-
-def name_causes(causes: Sequence[str]) -> str:
-    """Return effects by name, or only how many they are."""
-    names = tuple(dict.fromkeys(causes))
-    return ", ".join(names) if len(names) <= MANY else f"{len(names)} effects"
+        return f"Switched on in the simulator: {name_effects(self.causes)}."
 
 
 def read_diagnosis(reference: str, kind: str) -> Diagnosis:

@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from gsl.core.unit import Unit, format_gain
-from gsl.core.words import falls, in_unit, several
+from gsl.core.words import falls, in_unit, name_effects, several
 from gsl.errors import ArtifactError
-from gsl.grounding.diagnosis_file import name_causes
 from gsl.storage.artifact import Artifact
 
 Metrics = Mapping[str, Any]
@@ -118,7 +117,7 @@ def _optimize(metrics: Metrics, unit: Unit) -> str:
     best = unit.format(metrics["best_value_sim"])
     line = f"{several(metrics['generations'], 'generation')}, best {best} in simulation"
     if "effects" in metrics:
-        line += f"; {name_causes(metrics['effects'])} switched on" if metrics["effects"] else "; joints calibrated"
+        line += f"; {name_effects(metrics['effects'])} switched on" if metrics["effects"] else "; joints calibrated"
     alpha, passed = metrics.get("alpha"), metrics.get("grounding_acceptable", True)
     if alpha is None and passed:
         return line
