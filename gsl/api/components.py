@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,8 +11,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from gsl.api.overrides import overrides
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
 from gsl.core.described import restore
@@ -45,7 +47,7 @@ def make_world(name: str, *, config_dir: Path | str | None = None, **settings: A
         raise ConfigError("world.effects", "is a mapping of effects by name", given=str(effects))
     having: Any = having_effects(world)
     try:
-        changed: World = replace(having, effects={**having.effects, **effects})
+        changed: World = replace(having, effects={**having.effects, **deepcopy(effects)})
     except ValidationError as error:
         raise config_error(error, type(world), where="world") from error
     return changed
@@ -71,8 +73,7 @@ def _make(group: str, name: str, config_dir: Path | str | None, settings: Mappin
     below = {key: value for key, value in settings.items() if key not in own}
     folder, arguments = None if config_dir is None else Path(config_dir), list(overrides(own))
     with open_hydra(folder):
-        if folder is not None:  # effects of a world that is there already stay
-            load_own_effects(folder, find_trust(arguments))
+        load_own_effects(folder, find_trust(arguments))
         composition = compose(ROLES[group], [f"{group}={name}", *overrides(below, f"{group}."), *arguments])
     made = restore(resolve(composition)[group], trust=composition.trust, where=group)
     if not isinstance(made, kind):

@@ -27,9 +27,9 @@ def write_trajectories(path: Path | str, batch: Batch) -> None:
     Raises:
         TrajectoryError: They break the contract (docs/reference/files.md).
     """
-    place = Path(path)
     if not isinstance(batch, Batch):
         raise ConfigError("batch", "is no batch, as roll_out and read_trajectories return", given=str(batch))
+    place = Path(path)
     if place.is_dir() or not place.parent.is_dir():
         raise ConfigError("path", "is no file in a folder that exists", given=str(path))
     if place.suffix not in (".parquet", ""):

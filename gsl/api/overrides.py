@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from gsl.commandline.own_word import quote
 from gsl.errors import ConfigError
 
 _NAME = re.compile(r"[A-Za-z_][\w/-]*", re.ASCII)  # goes without quotes
@@ -39,7 +40,8 @@ def _text(value: Any) -> str:
         return "[" + ", ".join(map(_text, value)) + "]"
     if isinstance(value, str | Path):
         text = str(value)
-        return text if _NAME.fullmatch(text) and text.lower() not in _WORDS else json.dumps(text, ensure_ascii=False)
+        plain = _NAME.fullmatch(text) and text.lower() not in _WORDS
+        return text if plain else quote(text)
     if value is None or isinstance(value, bool | int | float):
         return json.dumps(value)
     raise ConfigError("settings", "are numbers, texts, lists, mappings or components", given=type(value).__name__)

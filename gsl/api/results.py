@@ -40,8 +40,9 @@ class Result:
 
     @property
     def folder(self) -> Path:
-        """Folder of the artifact."""
-        return self.artifact.folder
+        """Folder of the artifact, as seen from the current one where it lies below."""
+        place, here = self.artifact.folder, Path.cwd()
+        return place.relative_to(here) if place.is_relative_to(here) else place
 
     @property
     def metrics(self) -> Mapping[str, Any]:

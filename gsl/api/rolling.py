@@ -66,7 +66,7 @@ def roll_out(
     task, family = task or make_task("walk"), policy or make_policy("walk_engine")
     grounding = grounding or NoGrounding()
     for argument, kind in ((world, World), (task, Task), (family, Policy), (grounding, Grounding)):
-        if not isinstance(argument, kind):
+        if isinstance(argument, type) or not isinstance(argument, kind):
             name = kind.__name__.lower()
             raise ConfigError(name, f"is no {name}; gsl.make_{name} makes one", given=str(argument))
     family = size(family, world)

@@ -13,8 +13,9 @@ from omegaconf import DictConfig, OmegaConf
 from gsl.api.files import write_trajectories
 from gsl.api.overrides import overrides
 from gsl.api.results import Result, Verdict
-from gsl.commandline.composer import commands, compose, open_hydra
+from gsl.commandline.composer import commands, compose
 from gsl.commandline.config import CommandSettings, execute, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.commandline.overrides import file_of
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
@@ -24,6 +25,7 @@ from gsl.core.interfaces import World
 from gsl.core.trajectory import Batch
 from gsl.core.trust import modules_in
 from gsl.core.validation import did_you_mean, make
+from gsl.effects.effect import add_own, own_of
 from gsl.errors import ConfigError
 from gsl.report.console import Console
 from gsl.storage import manifest
@@ -48,29 +50,42 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
     command = str(command)
     if (name := file_of(command)) not in commands():
         raise ConfigError("command", f"there is none of this name{did_you_mean(name, commands())}", given=command)
-    objects = {key: value for key, value in settings.items() if is_dataclass(value)}
-    plain = {key: value for key, value in settings.items() if key not in objects}
+    described = {key: describe(value) for key, value in settings.items() if _is_component(value)}
+    plain = {key: value for key, value in settings.items() if key not in described}
     for key in plain:
-        if (whole := key.partition(".")[0]) in objects:
+        if (whole := key.partition(".")[0]) in described:
             raise ConfigError(key, f"is below {whole}, which goes as it is; set it there")
     folder, arguments = None if config_dir is None else Path(config_dir), list(overrides(plain))
     with open_hydra(folder):
-        if folder is not None:  # effects of a world that is there already stay
-            load_own_effects(folder, find_trust(arguments))
+        load_own_effects(folder, find_trust(arguments))
+        for component in described.values():
+            add_own(own_of(_effects_in(component)))
         composition = compose(command, arguments)
-        _refer(composition.config, {key: describe(value) for key, value in objects.items()})
+        _refer(composition.config, described)
         config = resolve(composition)
     trust = [*composition.trust]
-    for key, value in objects.items():
+    for key, component in described.items():
         if key not in config:
             raise ConfigError(key, f"gsl {command} has no such setting")
-        config[key] = describe(value)
+        config[key] = component
         trust += modules_in({key: config[key]})  # of a class that is in the user's hands already
     named = ", ".join(f"{key}={value!r}" for key, value in settings.items())
     document = execute(command, f"gsl.run({command!r}, {named})", config, Silent() if quiet else Console(), trust=trust)
-    place = Path(document["folder"])
+    place = Path(document["folder"]).absolute()
     made = Artifact(place, manifest.read(place), unchanged=document["unchanged"])
     return (Verdict if made.manifest.kind == "diagnose" else Result)(made, tuple(trust))
+
+
+def _is_component(value: Any) -> bool:
+    return is_dataclass(value) and not isinstance(value, type)
+
+
+def _effects_in(plain: Any) -> dict[str, Any]:
+    """Return what plain data of components has as `effects`, wherever it stands."""
+    effects: dict[str, Any] = {}
+    for key, value in plain.items() if isinstance(plain, Mapping) else ():
+        effects |= dict(value) if key == "effects" and isinstance(value, Mapping) else _effects_in(value)
+    return effects
 
 
 def _refer(config: DictConfig, components: Mapping[str, Mapping[str, Any]]) -> None:

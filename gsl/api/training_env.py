@@ -63,6 +63,11 @@ def grounded_env(
         ConfigError: A part is missing or does not fit.
         ArtifactError: There is no such run.
     """
+    for name, part, kind in (("world", world, World), ("task", task, Task), ("grounding", grounding, Grounding)):
+        if not (part is None or isinstance(part, str)) and (isinstance(part, type) or not isinstance(part, kind)):
+            raise ConfigError(name, f"is no {name}; gsl.make_{name} makes one", given=str(part))
+    if not (envs is None or (isinstance(envs, int) and envs >= 1)):
+        raise ConfigError("envs", "is how many environments stand side by side, 1 at least", given=str(envs))
     trusted = (trust,) if isinstance(trust, str) else tuple(trust)
     wired = make(Wiring, wiring, where="wiring") if isinstance(wiring, Mapping) else wiring
     actor = policy if wired is None else _Untrained(wired)

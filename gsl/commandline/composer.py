@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
-from hydra import initialize_config_dir
-from hydra.core.config_search_path import ConfigSearchPath, SearchPathQuery
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
 from hydra.errors import CompactHydraException, HydraException
-from hydra.plugins.search_path_plugin import SearchPathPlugin
 from hydra.types import RunMode
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
 from yaml import YAMLError
 
 from gsl.commandline.config_errors import Vocabulary, misshapen, shapeless, translate, unfit, unknown_key, unreadable
+from gsl.commandline.hydra_door import OtherConfiguration
 from gsl.commandline.known_settings import REFERRED, is_idle, list_keys, plain, read_declared, read_parts
 from gsl.commandline.overrides import COMMAND_KEYS, NAMES, effect_path, file_of, key_of, rewrite
 from gsl.commandline.own_word import check_own_word, check_servos, find_own_modules, find_trust, keep_text
 from gsl.commandline.plugins import folders, packages
-from gsl.commandline.yaml_files import USER, BudgetedFiles, check_folder, load_plugins
 from gsl.core.budget import within
 from gsl.core.configuration import configuration_folder
 from gsl.core.setting import Setting
@@ -61,39 +56,9 @@ class Composition:
     trust: tuple[str, ...] = ()
 
 
-class OtherConfiguration(SearchPathPlugin):
-    """Puts the user's folder of yaml files before ours, so that a file of the same name wins, and plugins' behind."""
-
-    folder: ClassVar[Path | None] = None
-
-    def manipulate_search_path(self, search_path: ConfigSearchPath) -> None:
-        """Add the folders that there are."""
-        if self.folder is not None:
-            search_path.prepend(USER, f"file://{self.folder}", anchor=SearchPathQuery(provider="main"))
-        for folder in folders():
-            search_path.append(f"gsl-{folder.parent.name}", f"file://{folder}")
-
-
 def commands() -> list[str]:
     """Return the names of the yaml files of all stages, ours and those of plugins."""
     return sorted(path.stem for folder in (configuration_folder(), *folders()) for path in folder.glob("*.yaml"))
-
-
-@contextmanager
-def open_hydra(config_dir: Path | None) -> Iterator[None]:
-    """Open hydra on our configuration and, in front of it, the user's.
-
-    Raises:
-        InputError: The user's folder does not exist, or is an artifact whose yaml files are not as they were written.
-    """
-    if config_dir is not None:
-        check_folder(config_dir)
-    OtherConfiguration.folder = config_dir.resolve() if config_dir is not None else None
-    load_plugins().register(OtherConfiguration)
-    with BudgetedFiles.in_place_of_hydras():
-        opening = initialize_config_dir(config_dir=str(configuration_folder()), version_base="1.3", job_name="gsl")
-    with opening:
-        yield
 
 
 def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -> Composition:

@@ -10,8 +10,9 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from gsl.commandline.composer import compose, groups, open_hydra, options
+from gsl.commandline.composer import compose, groups, options
 from gsl.commandline.config import WORKERS, CommandSettings, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.commandline.known_settings import REFERRED_GROUPS, is_idle, plain, read_declared
 from gsl.commandline.overrides import EXECUTOR_KEYS, OPTIONAL_GROUPS
 from gsl.commandline.own_effects import load_own_effects

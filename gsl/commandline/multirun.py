@@ -21,9 +21,10 @@ from joblib import register_parallel_backend
 from joblib._parallel_backends import LokyBackend
 from omegaconf import DictConfig, OmegaConf
 
-from gsl.commandline.composer import Composition, OtherConfiguration
+from gsl.commandline.composer import Composition
 from gsl.commandline.config import RUNS, execute, resolve
 from gsl.commandline.failure import describe_failure, report
+from gsl.commandline.hydra_door import OtherConfiguration
 from gsl.commandline.known_settings import plain
 from gsl.commandline.overrides import file_of, key_of
 from gsl.commandline.own_word import check_own_word, check_servos

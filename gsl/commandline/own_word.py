@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from hydra.core.override_parser.overrides_parser import OverridesParser
-from hydra.core.override_parser.types import ChoiceSweep, Override, QuotedString
+from hydra.core.override_parser.types import ChoiceSweep, Override, Quote, QuotedString
 from hydra.errors import HydraException
 from omegaconf import DictConfig, OmegaConf
 from omegaconf.errors import OmegaConfBaseException
@@ -34,6 +34,7 @@ _USUAL = {
     "out": re.compile(r"(runs/\$\{name\}/[\w${}]+|\$\{request\}/\$\{name\}|None)?"),
 }
 """What our files say of settings that a file of others may not say otherwise."""
+_appended: list[str] = []  # to Python's path
 
 
 def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
@@ -123,8 +124,11 @@ def check_servos(config: DictConfig, arguments: Sequence[str], folder: Path | No
 
 def find_own_modules(trust: Collection[str]) -> None:
     """Let modules of the current folder be imported once the user has named one; before that nothing in it is code."""
-    if trust and os.getcwd() not in sys.path:
-        sys.path.append(os.getcwd())
+    if trust and (here := os.getcwd()) not in sys.path:
+        for place in filter(sys.path.__contains__, _appended):  # of a command before, in another folder
+            sys.path.remove(place)
+        _appended[:] = [here]
+        sys.path.append(here)
 
 
 def keep_text(override: Override) -> Override:
@@ -133,6 +137,11 @@ def keep_text(override: Override) -> Override:
         return override
     key, _, typed = str(override.input_line).partition("=")
     return OverridesParser.create().parse_override(f'{key}="{typed.strip()}"')
+
+
+def quote(text: str) -> str:
+    """Return a text as a command line says it that means just this."""
+    return QuotedString(text, Quote.double).with_quotes()
 
 
 def _split_words(arguments: Sequence[str]) -> Iterator[tuple[str, Any]]:

@@ -9,8 +9,9 @@ from typing import Any
 
 from omegaconf import OmegaConf
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import execute, prepare, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.commandline.known_settings import REFERRED
 from gsl.commandline.multirun import run_jobs
 from gsl.commandline.own_effects import load_own_effects

@@ -14,6 +14,7 @@ from gsl.errors import GslError
 
 OURS = "gsl"
 PACKAGES = (OURS, "gsl_experiments", "gsl_benchmarks")  # what fails in these is our fault and no user's
+HOME = Path(__file__).parents[1]
 FOLDERS = {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
 """Where Python and its packages lie: what fails there without a caller elsewhere is not a user's own."""
 
@@ -61,8 +62,13 @@ def name_failures() -> Iterator[None]:
         raise GslError(line) from error
 
 
+def is_elsewhere(file: str) -> bool:
+    """Whether a file is none of gsl's, nor of Python and its packages."""
+    return not any(folder in Path(file).parents for folder in (*FOLDERS, HOME))
+
+
 def _is_own_frame(frame: FrameType) -> bool:
     if str(frame.f_globals.get("__name__", "")).partition(".")[0] in PACKAGES:
         return False
-    path = Path(frame.f_code.co_filename)
-    return path.is_file() and not any(folder in path.parents for folder in FOLDERS)
+    file = frame.f_code.co_filename
+    return Path(file).is_file() and is_elsewhere(file)

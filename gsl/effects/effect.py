@@ -47,6 +47,7 @@ class Effect(Protocol):
 
 
 _OWN: dict[str, type] = {}  # effects of a user's own in this process, by name
+_SEEN: dict[str, type] = {}  # all that this process has had: a world that is there keeps its own
 _WITHHELD: dict[str, ConfigError] = {}  # those that may not be used, with what to do
 
 
@@ -64,6 +65,7 @@ def use_own(classes: Mapping[str, type], refused: Mapping[str, ConfigError] | No
         check_own(name, kind)
     _OWN.clear()
     _OWN.update(classes)
+    _SEEN.update(classes)
     _WITHHELD.clear()
     _WITHHELD.update(refused or {})
 
@@ -71,6 +73,17 @@ def use_own(classes: Mapping[str, type], refused: Mapping[str, ConfigError] | No
 def own() -> Mapping[str, type]:
     """Return the effects of a user's own, by name."""
     return dict(_OWN)
+
+
+def own_of(effects: Mapping[str, Any]) -> Mapping[str, type]:
+    """Return the effects of a user's own among some by name, in use now or when their world was made."""
+    return {name: _SEEN[name] for name in effects if name in _SEEN}
+
+
+def add_own(classes: Mapping[str, type]) -> None:
+    """Have effects of a user's own beside those in use: a world that is there has them."""
+    _OWN.update(classes)
+    _SEEN.update(classes)
 
 
 def withheld(name: str) -> ConfigError | None:

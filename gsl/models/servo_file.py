@@ -45,11 +45,11 @@ def read_servo(reference: str, member: int = 0) -> ServoModel:
 def read_members(reference: str) -> ServoMembers:
     """Read all members of a learned servo; errors as those of `read_servo`."""
     path = servo_file(reference)
-    return _read(path, path.stat().st_mtime_ns)
+    return _read(path, (path.resolve(), path.stat().st_mtime_ns))
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, changed: int) -> ServoMembers:
+def _read(path: Path, which: tuple[Path, int]) -> ServoMembers:
     arrays, about = read_checkpoint(path, kind=ServoModel.kind)
     try:
         return ServoMembers.from_arrays(arrays, about)

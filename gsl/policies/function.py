@@ -11,6 +11,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from gsl.core.loaded import note
 from gsl.core.setting import component, setting
 from gsl.errors import ConfigError, GslError
 from gsl.policies.outside import Joints, Network, Outside, Ports
@@ -88,6 +89,7 @@ def _import(name: str) -> Any:
     except Exception as error:
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise ConfigError("policy.function", f"cannot be loaded: {reason}", given=name) from error
+    note(module)
     if not callable(callee):
         raise ConfigError("policy.function", "is no function", given=name)
     return callee

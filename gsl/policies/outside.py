@@ -147,9 +147,9 @@ def policy_file(name: str) -> Path:
 def read_once(reader: Any, name: str) -> Any:
     """Return what a reader makes of a file, read once a process and again after a change of it."""
     path = policy_file(name)
-    return _read(reader, path, path.stat().st_mtime_ns)
+    return _read(reader, path, (path.resolve(), path.stat().st_mtime_ns))
 
 
 @lru_cache(maxsize=4)
-def _read(reader: Any, path: Path, changed: int) -> Any:
+def _read(reader: Any, path: Path, which: tuple[Path, int]) -> Any:
     return reader(path)

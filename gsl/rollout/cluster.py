@@ -10,6 +10,7 @@ import socket
 import threading
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from typing import Any
@@ -36,6 +37,7 @@ class Cluster:
         self._place = address or "the local dask cluster"
         self._client: Any = None
         self._local: Any = None
+        self._levels: dict[str, int] = {}  # of other loggers, before
 
     def arriving(self, function: Any, frozen: bytes, jobs: Sequence[Any], workers: int) -> Iterator[tuple[int, Any]]:
         """Yield (index of job, `function(frozen, job)`) of all jobs, as they end.
@@ -73,13 +75,17 @@ class Cluster:
                 if part is not None:
                     part.close(timeout=CONNECT)
         self._client = self._local = None
+        for name, level in self._levels.items():
+            logging.getLogger(name).setLevel(level)
 
     def _connect(self, workers: int) -> Any:
         if self._client is not None:
             return self._client
         from distributed import Client
 
-        for name in [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in LOUD]:
+        loud = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] in LOUD]
+        self._levels = {name: logging.getLogger(name).level for name in loud} | self._levels
+        for name in loud:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         with processes_starting():
             if self._address is None:
@@ -99,7 +105,8 @@ class Cluster:
 
         with self._loss():
             try:
-                return asyncio.run(ask())
+                with ThreadPoolExecutor(1) as aside:  # a notebook runs a loop of its own in this thread
+                    return aside.submit(asyncio.run, ask()).result()
             except (ImportError, OSError):
                 raise
             except Exception as error:  # who knows what another kind of server says
@@ -170,7 +177,7 @@ def _run(work: bytes, frozen: bytes, place: Place, sources: str) -> bytes:
         try:
             if sources_hash() != sources:
                 raise GslError(f"worker on {socket.gethostname()}: has another gsl; install the same on all machines")
-            place.enter()
+            place.enter_elsewhere()
             with name_failures():
                 function, job = pickle.loads(work)  # noqa: S301  our own bytes, from whoever started the command
                 return pickle.dumps((function(frozen, job), None))

@@ -19,6 +19,7 @@ from pydantic import AfterValidator
 from gsl.core.compiling import report_to, share_compilations
 from gsl.core.console import Progress
 from gsl.core.interruption import end_with_parent, processes_starting
+from gsl.core.loaded import Stamp, pickle_with_code, stamps
 from gsl.core.own_code import name_failures
 from gsl.core.setting import setting
 from gsl.core.trajectory import Trajectory
@@ -111,16 +112,19 @@ def arriving(
 
 
 def _pickle(shared: Any, *, alone: bool) -> bytes:
-    """Return what all workers need, pickled.
+    """Return what all workers need, pickled; what stands by of classes that were made anew since then is closed.
 
     Raises:
         GslError: A component of the user's own cannot be.
     """
     try:
-        frozen = pickle.dumps(shared)
+        frozen, code = pickle_with_code(shared)
     except (pickle.PicklingError, AttributeError, TypeError) as error:
         advice = "give its object plain fields and functions of a module, no closures"
         raise GslError(f"a component cannot go to the worker processes ({error}); {advice}") from error
+    if code != _standing.code:
+        _standing.close()
+        _standing.code = code
     if not alone and b"__main__" in frozen:
         problem = "a class of this script or notebook cannot be found by worker processes"
         raise GslError(f"{problem}; put it into a module of its own, or say workers=1")
@@ -139,7 +143,7 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
     if workers == 1 or joblib.effective_n_jobs(workers) == 1 or getattr(engine, "uses_threads", False):
         yield from ((index, function(frozen, jobs[index])) for index in missing)
         return
-    begin = {"initializer": _begin_worker, "initargs": (os.getpid(), share_compilations())}
+    begin = {"initializer": _begin_worker, "initargs": (os.getpid(), share_compilations(), stamps())}
     more = begin if isinstance(engine, LokyBackend) else {}
     # Without max_nbytes=None joblib leaves a file for every large array.
     parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **more)
@@ -152,7 +156,8 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
         return
 
 
-def _begin_worker(parent: int, marks: str) -> None:
+def _begin_worker(parent: int, marks: str, loaded: Sequence[Stamp]) -> None:
+    """Begin; joblib starts other workers where what was loaded is not the same."""
     end_with_parent(parent)
     report_to(marks)
 
@@ -180,6 +185,13 @@ class _StandingBy(threading.local):
 
     frozen: bytes | None = None
     ready: tuple[Scenario, Any]
+    code: tuple[Any, ...] = ()
+
+    def close(self) -> None:
+        """Let go of the environment."""
+        if self.frozen is not None:
+            self.frozen = None
+            self.ready[1].close()
 
 
 _standing = _StandingBy()
@@ -188,9 +200,7 @@ _standing = _StandingBy()
 def _standing_by(frozen: bytes) -> tuple[Scenario, Any]:
     """Return a scenario with its environment, kept from one job to the next."""
     if frozen != _standing.frozen:
-        if _standing.frozen is not None:
-            _standing.ready[1].close()
-            _standing.frozen = None
+        _standing.close()
         scenario = pickle.loads(frozen)  # noqa: S301  our own bytes, from the parent process
         _standing.ready, _standing.frozen = (scenario, scenario.make()), frozen
     return _standing.ready

@@ -8,19 +8,27 @@ from typing import NamedTuple
 
 
 class Place(NamedTuple):
-    """A folder, and whether modules are imported from it."""
+    """A folder, and where modules are imported from."""
 
     folder: str
-    imports: bool
+    path: tuple[str, ...]
 
     @classmethod
     def here(cls) -> Place:
         """Return the place of this process."""
-        return cls(os.getcwd(), os.getcwd() in sys.path)
+        return cls(os.getcwd(), tuple(sys.path))
 
     def enter(self) -> None:
-        """Go there, as a worker outlives a change of folder; a machine that has no such folder stays where it is."""
+        """Go there, as a worker outlives a change of folder."""
+        self._go()
+        sys.path[:] = self.path
+
+    def enter_elsewhere(self) -> None:
+        """Go there on a machine that may have no such folder, and has packages of its own."""
+        self._go()
+        if self.folder in self.path and self.folder not in sys.path:
+            sys.path.append(self.folder)
+
+    def _go(self) -> None:
         if os.path.isdir(self.folder):
             os.chdir(self.folder)
-        if self.imports and self.folder not in sys.path:
-            sys.path.append(self.folder)

@@ -21,6 +21,7 @@ from gsl.grounding.preparation import parents_of, without_margins
 from gsl.optimizers.candidates import check_candidates
 from gsl.optimizers.objective import CVAR, Objective, Quantile, check_objective, objective_values
 from gsl.optimizers.race import Race, Racing
+from gsl.optimizers.random_state import keep_apart
 from gsl.policies.outside import warn_of_wiring
 from gsl.policies.policy import size_to_search
 from gsl.report.iteration_page import read_check
@@ -174,7 +175,7 @@ class Optimize:
         with console.progress(total, "learning in simulation") as progress:
             bold = self.initial is None
             steps = optimizer.learn(simulator, self.policy, first, seed, bold=bold, advance=progress.advance)
-            for index, parameters in enumerate(steps):
+            for index, parameters in enumerate(keep_apart(steps)):
                 done = self._evaluate(scenario, [parameters], index, progress)
                 value = done.values[0]
                 note_step("learner", index + 1, value=value, falls=done.falls[0])

@@ -11,8 +11,10 @@ from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any
 
+from gsl.core.loaded import check_unchanged, note
 from gsl.core.own_code import is_own
 from gsl.effects.effect import own
+from gsl.errors import GslError
 
 
 def read_files(thing: Any) -> dict[str, Path]:
@@ -33,6 +35,8 @@ def _find(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
     elif is_dataclass(thing) and not isinstance(thing, type):
         parts = {field.name: getattr(thing, field.name) for field in fields(thing)}
         own: Mapping[str, Path] = getattr(thing, "read_files", {})
+        for path in own.values():
+            check_unchanged(path)
         yield from ((f"{where}{name}", path) for name, path in own.items())
         if where:  # the stage itself is part of its identity, with its whole package
             yield from ((f"{where}_target_{k or ''}", path) for k, path in enumerate(_sources(type(thing))))
@@ -43,6 +47,24 @@ def _find(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
 
 
 def _sources(kind: type) -> list[Path]:
-    """Return the files of a class and of what it derives from, gsl's own and Python's left out."""
-    files = [inspect.getsourcefile(base) for base in kind.__mro__ if is_own(base)]
+    """Return the files of a class and of what it derives from, gsl's own and Python's left out.
+
+    Raises:
+        GslError: One has no file, or its file is not what was loaded.
+    """
+    files = [_source(base) for base in kind.__mro__ if is_own(base)]
     return list(dict.fromkeys(Path(file) for file in files if file))
+
+
+def _source(kind: type) -> str | None:
+    note(kind.__module__)
+    try:
+        file = inspect.getsourcefile(kind)
+    except (OSError, TypeError):
+        file = None
+    if kind.__module__ == "__main__" and not (file and Path(file).is_file()):
+        problem = "has no file, and an artifact notes that of its components; put it into a module"
+        raise GslError(f"{kind.__qualname__} of a notebook or prompt {problem}")
+    if file:
+        check_unchanged(Path(file))
+    return file

@@ -156,18 +156,35 @@ class _LogFile(logging.FileHandler):
         raise
 
 
+class _Others(logging.Handler):
+    """Whoever listens to the program's log beside the file: they hear what they would without it."""
+
+    def __init__(self, level: int, *, listening: bool) -> None:
+        super().__init__(level)
+        self.listening = listening
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Pass a record on."""
+        if self.listening:
+            logging.getLogger().handle(record)
+
+
 @contextmanager
 def log_to(folder: Path) -> Iterator[logging.Logger]:
     """Write what gsl logs to the folder's log file, too; resumed work goes on in the same file."""
     logger = logging.getLogger("gsl")
     handler = _LogFile(folder / LOG, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
-    level = logger.level
+    level, others = logger.level, _Others(logger.getEffectiveLevel(), listening=logger.propagate)
     logger.addHandler(handler)
+    logger.addHandler(others)
     logger.setLevel(min(level, logging.INFO) or logging.INFO)
+    logger.propagate = False
     try:
         yield logger
     finally:
+        logger.propagate = others.listening
+        logger.removeHandler(others)
         logger.setLevel(level)
         logger.removeHandler(handler)
         handler.close()

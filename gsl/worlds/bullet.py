@@ -18,7 +18,7 @@ from gsl.core.body import lump
 from gsl.core.layout import Layout
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
-from gsl.effects.effect import apply_all, build, own, use_own
+from gsl.effects.effect import add_own, apply_all, build, own, own_of
 from gsl.errors import ConfigError, GslError
 from gsl.models.servo import having_servo
 from gsl.models.servo_file import read_servo, servo_file
@@ -86,12 +86,13 @@ class BulletWorld:
         """Leave a plant with a torque hook out: a worker builds its own, as a hook need not be a module's function."""
         hooked = self.plant.hook is not None
         state = {name: value for name, value in vars(self).items() if not (hooked and name == "plant")}
-        return {**state, OWN: own()} if own() else state
+        classes = {**own_of(self.effects), **own()}
+        return {**state, OWN: classes} if classes else state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Have effects of a user's own in a worker process too."""
         if classes := state.pop(OWN, None):
-            use_own(classes)
+            add_own(classes)
         vars(self).update(state)
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import importlib.util
 import logging
+import sys
 import sysconfig
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
@@ -14,6 +15,7 @@ from typing import Any
 
 import gymnasium
 
+from gsl.core.loaded import note
 from gsl.errors import ConfigError
 from gsl.version import PACKAGE
 from gsl.worlds.mujoco import without_remarks
@@ -65,6 +67,7 @@ def _maker(name: str) -> Callable[..., Any]:
         absent = isinstance(error, ModuleNotFoundError) and error.name and f"{place}.".startswith(f"{error.name}.")
         problem = "there is no such environment" if absent else "its module cannot be imported"
         raise ConfigError("env_id", f"{problem}: {type(error).__name__}: {line(error)}", given=name) from error
+    note(place)
     if not hasattr(module, attribute):
         raise ConfigError("env_id", f"there is no such environment: {place} has no {attribute}", given=name)
     return getattr(module, attribute)
@@ -80,6 +83,13 @@ def own_module(name: str) -> Path | None:
         return None
     path = Path(spec.origin)
     return None if any(path.is_relative_to(place) for place in _INSTALLED) else path
+
+
+def own_code(name: str) -> Any:
+    """Return the class or function in `module:Class` of a user's own, if it is loaded."""
+    module, _, word = name.partition(":")
+    code = getattr(sys.modules.get(module), word, None) if own_module(name) else None
+    return code if getattr(code, "__qualname__", None) == word else None  # else nobody finds it by its name
 
 
 @contextmanager

@@ -22,9 +22,10 @@ from gsl.core.setting import component, setting
 from gsl.core.table import Table
 from gsl.errors import ConfigError, GslError
 from gsl.worlds.control_cost import Charged, ControlCost
-from gsl.worlds.environments import line, make_environment, own_module
+from gsl.worlds.environments import line, make_environment, own_code, own_module
 from gsl.worlds.mujoco import change_masses
 
+_CODE = "code of the environment"  # among what is pickled
 _STREAM = 11  # sets the noise on actions apart from the environment's own randomness, whose seed is the same
 
 
@@ -51,6 +52,14 @@ class GymnasiumWorld:
         if self.layout.choices and self.action_noise > 1.0:
             problem = "is a chance where actions are choices, 1 at most"
             raise ConfigError("action_noise", problem, given=f"{self.action_noise:g}")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Name the code of an environment of the user's own: whoever pickles the world hears of what it runs."""
+        return {**vars(self), _CODE: own_code(self.env_id)}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Take the settings; the code came with them."""
+        vars(self).update({name: value for name, value in state.items() if name != _CODE})
 
     @property
     def label(self) -> str:

@@ -10,9 +10,10 @@ import yaml
 from example_stage import ExampleWorld
 
 from gsl.cli import call
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import prepare, resolve
 from gsl.commandline.failure import describe_failure
+from gsl.commandline.hydra_door import open_hydra
 from gsl.commandline.multirun import job_level
 from gsl.commandline.plugins import folders
 from gsl.core.configuration import configuration_folder

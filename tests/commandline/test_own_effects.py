@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import pickle
 import re
@@ -14,7 +15,7 @@ import numpy as np
 import pytest
 from commands import ENVIRONMENT, done, gsl, refused
 
-from gsl import make_world
+from gsl import make_world, run
 from gsl.commandline.help import write_help
 from gsl.core.configuration import list_worlds
 from gsl.core.plant import nominal
@@ -128,12 +129,17 @@ def test_a_world_file_may_name_it(home: Path) -> None:
     np.testing.assert_allclose(world.plant.servo.coulomb, np.where(legs, 0.05, 0.0))
 
 
-def test_a_world_from_python_may_have_it(home: Path) -> None:
+def test_a_world_from_python_may_have_it(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(home)
     world = make_world("nao_ideal", config_dir=home / "my_conf", effects={NAME: {"thickness": 1.0}})
     assert isinstance(world, BulletWorld)
     assert world.plant.servo.coulomb.min() == pytest.approx(0.1)
     make_world("nao_ideal")
-    assert own(), "another world leaves it in use"
+    assert not own(), "another world has none of it"
+    made = run("collect", world=world, name="still", episodes=1, workers=1, task={"duration": 0.1})
+    assert NAME in made.artifact.config["world"]["effects"], "and it has it all the same"
+    plain = run("collect", world="nao_ideal", name="plain", episodes=1, workers=1, task={"duration": 0.1})
+    assert not any(NAME in parent.role for parent in plain.artifact.manifest.parents)
 
 
 @pytest.mark.parametrize(
@@ -174,6 +180,8 @@ def test_after_an_edit_of_the_class_an_artifact_is_another(home: Path) -> None:
     command = ("collect", *OWN, *QUICK, "world=nao_ideal", "name=edited")
     done(*command, folder=home)
     path.write_text(path.read_text().replace("0.3 * more", "0.4 * more"))
+    assert "edited.py: was changed after it was loaded; start Python anew" in refused(*command, folder=home, code=1)
+    importlib.reload(sys.modules["edited"])
     assert "was built otherwise" in refused(*command, folder=home)
     (home / "my_conf/effect/edited.yaml").unlink()
 

@@ -19,8 +19,9 @@ import pytest
 from commands import done
 from pages import FENCE, GUIDES, ROOT, Command, commands
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import prepare, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.commandline.own_effects import load_own_effects
 from gsl.commandline.own_word import find_trust
 from gsl.effects.effect import names, use_own

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from bodies import STANCE, followed, held, walked
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.core.described import restore
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import Setting, settings_of

@@ -11,8 +11,9 @@ import pytest
 from commands import gsl
 from scipy.stats import spearmanr
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import prepare, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.errors import ArtifactError
 from gsl.report.style import GAT, UNINFORMED
 from gsl.validation.compliance import Compliance

@@ -11,8 +11,9 @@ import pytest
 from browser import check_seen
 from commands import done, gsl
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import prepare, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.core.console import Silent
 from gsl.errors import ArtifactError
 from gsl.grounding.gat import ActionTransformation

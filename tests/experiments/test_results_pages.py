@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import prepare, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.core.unit import Unit
 from gsl_experiments import budget, noise_table
 from gsl_experiments.budget import Budget

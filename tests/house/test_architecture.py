@@ -27,7 +27,7 @@ FLOORS = (  # from the ground up: a room imports from lower floors alone
     ("stages",),
 )
 BESIDE = ("experiments/gsl_experiments", "benchmarks/gsl_benchmarks")  # above all floors: each imports gsl and itself
-COMPOSING = ("composer", "config_errors", "multirun", "own_word", "yaml_files")
+COMPOSING = ("composer", "config_errors", "hydra_door", "multirun", "own_word", "yaml_files")
 ONLY = {
     "hydra": tuple(f"commandline/{name}.py" for name in COMPOSING),
     "pybullet": ("worlds/engine.py", "worlds/camera.py"),

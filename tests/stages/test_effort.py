@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import prepare, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.stages.effort import count_rollouts, foresee, links
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import prepare, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.core.console import Silent
 from gsl.core.interfaces import Grounding
 from gsl.stages.iterate import Iterate

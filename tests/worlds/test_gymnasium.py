@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import sys
 import tempfile
@@ -16,8 +17,9 @@ import numpy as np
 import pytest
 from commands import done, gsl, refused
 
-from gsl.commandline.composer import compose, open_hydra
+from gsl.commandline.composer import compose
 from gsl.commandline.config import prepare, resolve
+from gsl.commandline.hydra_door import open_hydra
 from gsl.core.layout import check_alike
 from gsl.core.seeds import derive_seed
 from gsl.core.trajectory import Batch
@@ -536,6 +538,8 @@ def test_a_change_of_one_s_own_environment_makes_another_world(tmp_path: Path, m
     done(*line, folder=tmp_path)
     assert "unchanged" in done(*line, folder=tmp_path).out
     (tmp_path / "own_cart.py").write_text(text + "\n")
+    assert "was changed after it was loaded" in refused(*line, folder=tmp_path, code=1)
+    importlib.reload(sys.modules["own_cart"])
     assert "changed: the data of world.env_id" in refused(*line, folder=tmp_path)
     assert own_module("gsl.worlds.cliff_walking:CliffWalking") is own_module("HalfCheetah-v5") is None
 
