@@ -5,6 +5,7 @@ A long-lived process, such as a notebook, would else write results of old code d
 
 from __future__ import annotations
 
+import hashlib
 import io
 import os
 import pickle
@@ -18,11 +19,10 @@ from gsl.errors import GslError
 
 
 class Stamp(NamedTuple):
-    """A file as it was when its module was first seen here: time of its last change [ns], and size [bytes]."""
+    """A file as it was when its module was first seen here."""
 
     file: str
-    changed: int
-    size: int
+    sha256: str
 
 
 _seen: dict[str, tuple[Any, Stamp]] = {}  # what each module was loaded by, which a reload replaces
@@ -65,18 +65,17 @@ class _Pickler(pickle.Pickler):
 
     def __init__(self, file: io.BytesIO) -> None:
         super().__init__(file)
-        self.code = dict[Any, None]()
+        self.code: list[Any] = []
 
     def reducer_override(self, thing: Any) -> Any:
         """Note what is of a user's own, and leave the rest to pickle."""
         if isinstance(thing, type | FunctionType):
             file = getattr(sys.modules.get(thing.__module__), "__file__", None)
             if file is None or is_elsewhere(file):
-                self.code[thing] = None
+                self.code.append(thing)
                 note(thing.__module__)
         return NotImplemented
 
 
 def _stamp(file: str) -> Stamp:
-    status = Path(file).stat()
-    return Stamp(file, status.st_mtime_ns, status.st_size)
+    return Stamp(file, hashlib.sha256(Path(file).read_bytes()).hexdigest())
