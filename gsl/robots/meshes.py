@@ -108,13 +108,13 @@ def write_stl(path: Path, part: Part) -> None:
 
 def _read(file: Path) -> tuple[Part, ...]:
     try:
-        return _load(file, file.stat().st_mtime_ns)
+        return _load(file, (file.resolve(), file.stat().st_mtime_ns))
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror}") from error
 
 
 @lru_cache(maxsize=_KEPT)
-def _load(file: Path, changed: int) -> tuple[Part, ...]:
+def _load(file: Path, which: tuple[Path, int]) -> tuple[Part, ...]:
     """Return what is in a file; one that was changed is read again."""
     import trimesh
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
 from gsl.core.budget import ARTIFACT_BYTES, open_file
 
@@ -38,18 +39,27 @@ def contents_hash(kind: str, hashes: Mapping[str, str]) -> str:
     return hashlib.sha256("\n".join([kind, *lines]).encode()).hexdigest()
 
 
-@functools.cache
 def sources_hash(other: Path | None = None) -> str:
-    """Return the hash of gsl's sources, and of another package's Python files; read once a process.
+    """Return the hash of gsl's sources, which are read once a process, and of another package's Python files.
 
     Args:
         other: Folder of the package, or a file if it is one.
     """
-    digest = hashlib.sha256()
-    own = (path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
-    others = [] if other is None else [other] if other.is_file() else other.rglob("*.py")
-    for place, paths in ((PACKAGE, own), (other or PACKAGE, others)):
-        for path in sorted(paths):
-            digest.update(f"{path.relative_to(place).as_posix()}\0{path.stat().st_size}\0".encode())
-            digest.update(path.read_bytes())
+    digest = _digest_ours().copy()
+    if other is not None:
+        _digest(digest, other, [other] if other.is_file() else other.rglob("*.py"))
     return digest.hexdigest()
+
+
+@functools.cache
+def _digest_ours() -> Any:
+    digest = hashlib.sha256()
+    files = (path for path in PACKAGE.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
+    _digest(digest, PACKAGE, files)
+    return digest
+
+
+def _digest(digest: Any, place: Path, paths: Iterable[Path]) -> None:
+    for path in sorted(paths):
+        digest.update(f"{path.relative_to(place).as_posix()}\0{path.stat().st_size}\0".encode())
+        digest.update(path.read_bytes())

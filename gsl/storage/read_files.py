@@ -38,8 +38,9 @@ def _find(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
         for path in own.values():
             check_unchanged(path)
         yield from ((f"{where}{name}", path) for name, path in own.items())
+        sources = _sources(type(thing))
         if where:  # the stage itself is part of its identity, with its whole package
-            yield from ((f"{where}_target_{k or ''}", path) for k, path in enumerate(_sources(type(thing))))
+            yield from ((f"{where}_target_{k or ''}", path) for k, path in enumerate(sources))
     else:
         return
     for name, part in parts.items():
