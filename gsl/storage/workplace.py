@@ -164,9 +164,9 @@ class _Others(logging.Handler):
         self.listening = listening
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Pass a record on."""
-        if self.listening:
-            logging.getLogger().handle(record)
+        """Pass a record on, if anybody listens: logging itself would print what nobody handles."""
+        if self.listening and (root := logging.getLogger()).handlers:
+            root.handle(record)
 
 
 @contextmanager
