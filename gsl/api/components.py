@@ -20,12 +20,14 @@ from gsl.core.described import restore
 from gsl.core.interfaces import Grounding, Policy, Task, World
 from gsl.core.trust import TRUST
 from gsl.core.validation import config_error
+from gsl.effects.effect import keep_own
 from gsl.errors import ConfigError
 from gsl.grounding.effects import having_effects
 
 ROLES = {"world": "collect", "task": "collect", "policy": "collect", "grounding": "optimize"}  # a command that has each
 
 
+@keep_own()
 def make_world(name: str, *, config_dir: Path | str | None = None, **settings: Any) -> World:
     """Return a world by the name of its yaml file.
 
@@ -53,16 +55,19 @@ def make_world(name: str, *, config_dir: Path | str | None = None, **settings: A
     return changed
 
 
+@keep_own()
 def make_task(name: str, *, config_dir: Path | str | None = None, **settings: Any) -> Task:
     """Return a task by the name of its yaml file; arguments as those of `make_world`."""
     return _make("task", name, config_dir, settings, Task)
 
 
+@keep_own()
 def make_policy(name: str, *, config_dir: Path | str | None = None, **settings: Any) -> Policy:
     """Return a family of policies by the name of its yaml file; arguments as those of `make_world`."""
     return _make("policy", name, config_dir, settings, Policy)
 
 
+@keep_own()
 def make_grounding(name: str, *, config_dir: Path | str | None = None, **settings: Any) -> Grounding:
     """Return a grounding by the name of its yaml file; arguments as those of `make_world`."""
     return _make("grounding", name, config_dir, settings, Grounding)

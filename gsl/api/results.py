@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -41,8 +42,10 @@ class Result:
     @property
     def folder(self) -> Path:
         """Folder of the artifact, as seen from the current one where it lies below."""
-        place, here = self.artifact.folder, Path.cwd()
-        return place.relative_to(here) if place.is_relative_to(here) else place
+        place = self.artifact.folder
+        with suppress(OSError, ValueError):  # the current folder is gone, or another one
+            return place.relative_to(Path.cwd())
+        return place
 
     @property
     def metrics(self) -> Mapping[str, Any]:

@@ -25,7 +25,7 @@ from gsl.core.interfaces import World
 from gsl.core.trajectory import Batch
 from gsl.core.trust import modules_in
 from gsl.core.validation import did_you_mean, make
-from gsl.effects.effect import add_own, own_of
+from gsl.effects.effect import add_own, keep_own
 from gsl.errors import ConfigError
 from gsl.report.console import Console
 from gsl.storage import manifest
@@ -33,6 +33,7 @@ from gsl.storage.artifact import Artifact
 from gsl.storage.hashing import file_hash
 
 
+@keep_own()
 def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = True, **settings: Any) -> Result:
     """Run a stage and return what it has made; what is there already and unchanged is not made again.
 
@@ -58,8 +59,8 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
     folder, arguments = None if config_dir is None else Path(config_dir), list(overrides(plain))
     with open_hydra(folder):
         load_own_effects(folder, find_trust(arguments))
-        for component in described.values():
-            add_own(own_of(_effects_in(component)))
+        for key in described:
+            add_own(getattr(settings[key], "own_effects", {}))
         composition = compose(command, arguments)
         _refer(composition.config, described)
         config = resolve(composition)
@@ -78,14 +79,6 @@ def run(command: str, *, config_dir: Path | str | None = None, quiet: bool = Tru
 
 def _is_component(value: Any) -> bool:
     return is_dataclass(value) and not isinstance(value, type)
-
-
-def _effects_in(plain: Any) -> dict[str, Any]:
-    """Return what plain data of components has as `effects`, wherever it stands."""
-    effects: dict[str, Any] = {}
-    for key, value in plain.items() if isinstance(plain, Mapping) else ():
-        effects |= dict(value) if key == "effects" and isinstance(value, Mapping) else _effects_in(value)
-    return effects
 
 
 def _refer(config: DictConfig, components: Mapping[str, Mapping[str, Any]]) -> None:

@@ -66,7 +66,7 @@ def grounded_env(
     for name, part, kind in (("world", world, World), ("task", task, Task), ("grounding", grounding, Grounding)):
         if not (part is None or isinstance(part, str)) and (isinstance(part, type) or not isinstance(part, kind)):
             raise ConfigError(name, f"is no {name}; gsl.make_{name} makes one", given=str(part))
-    if not (envs is None or (isinstance(envs, int) and envs >= 1)):
+    if not (envs is None or (isinstance(envs, int | np.integer) and envs >= 1)):
         raise ConfigError("envs", "is how many environments stand side by side, 1 at least", given=str(envs))
     trusted = (trust,) if isinstance(trust, str) else tuple(trust)
     wired = make(Wiring, wiring, where="wiring") if isinstance(wiring, Mapping) else wiring
@@ -77,7 +77,7 @@ def grounded_env(
         plain = simulator.env()
         return plain if own is None else WiredEnv(plain, own, simulator.layout, spaces)
 
-    return env() if envs is None else gymnasium.vector.SyncVectorEnv(envs * [env])
+    return env() if envs is None else gymnasium.vector.SyncVectorEnv(int(envs) * [env])
 
 
 def _simulator(

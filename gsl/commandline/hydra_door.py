@@ -53,8 +53,8 @@ def open_hydra(config_dir: Path | None) -> Iterator[None]:
         GlobalHydra.instance().clear()
         OtherConfiguration.ours = True
         OtherConfiguration.folder = config_dir.resolve() if config_dir is not None else None
-        load_plugins().register(OtherConfiguration)
         try:
+            load_plugins().register(OtherConfiguration)
             with BudgetedFiles.in_place_of_hydras():
                 opening = initialize_config_dir(
                     config_dir=str(configuration_folder()), version_base="1.3", job_name="gsl"

@@ -34,7 +34,7 @@ _USUAL = {
     "out": re.compile(r"(runs/\$\{name\}/[\w${}]+|\$\{request\}/\$\{name\}|None)?"),
 }
 """What our files say of settings that a file of others may not say otherwise."""
-_appended: list[str] = []  # to Python's path
+_appended: set[str] = set()  # folders, to Python's path
 
 
 def find_trust(arguments: Sequence[str]) -> tuple[str, ...]:
@@ -123,12 +123,30 @@ def check_servos(config: DictConfig, arguments: Sequence[str], folder: Path | No
 
 
 def find_own_modules(trust: Collection[str]) -> None:
-    """Let modules of the current folder be imported once the user has named one; before that nothing in it is code."""
-    if trust and (here := os.getcwd()) not in sys.path:
-        for place in filter(sys.path.__contains__, _appended):  # of a command before, in another folder
-            sys.path.remove(place)
-        _appended[:] = [here]
-        sys.path.append(here)
+    """Let modules of the current folder be imported once the user has named one; before that nothing in it is code.
+
+    Raises:
+        ConfigError: One is loaded from another folder already, where a command of this process was typed before.
+    """
+    if not trust:
+        return
+    here = os.getcwd()
+    if here in _appended and here in sys.path:
+        sys.path.remove(here)
+    if here not in sys.path:  # before folders of earlier commands
+        sys.path.insert(min((k for k, place in enumerate(sys.path) if place in _appended), default=len(sys.path)), here)
+        _appended.add(here)
+    for module in filter(None, trust):
+        _check_place(module.partition(".")[0])
+
+
+def _check_place(module: str) -> None:
+    specs = (finder.find_spec(module, None) for finder in sys.meta_path if hasattr(finder, "find_spec"))
+    there = getattr(next(filter(None, specs), None), "origin", None)
+    loaded = getattr(sys.modules.get(module), "__file__", None)
+    if there and loaded and os.path.isfile(there) and os.path.realpath(there) != os.path.realpath(loaded):
+        problem = f"is loaded from {os.path.dirname(loaded)} already; start Python anew, or give it another name"
+        raise ConfigError(TRUST, problem, given=module)
 
 
 def keep_text(override: Override) -> Override:

@@ -59,10 +59,11 @@ def run(
         if multirun:
             prepare(resolve(composition), composition.trust)
             return run_jobs(command, line, composition, console)
-        with divert_prints(json):
-            document = execute(command, line, resolve(composition), console, trust=composition.trust)
-        console.result(document, text=summarise(document))
-        return int(document.get("exit_code", 0))
+        settings = resolve(composition)
+    with divert_prints(json):
+        document = execute(command, line, settings, console, trust=composition.trust)
+    console.result(document, text=summarise(document))
+    return int(document.get("exit_code", 0))
 
 
 def _in_order(settings: Mapping[str, Any]) -> dict[str, Any]:

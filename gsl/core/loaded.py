@@ -11,7 +11,7 @@ import os
 import pickle
 import sys
 from pathlib import Path
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import Any, NamedTuple
 
 from gsl.core.own_code import is_elsewhere
@@ -30,8 +30,8 @@ _seen: dict[str, tuple[Any, Stamp]] = {}  # what each module was loaded by, whic
 
 def note(module: str) -> None:
     """Remember the file of a module of a user's own as it is now, unless that was seen before."""
-    loaded = sys.modules.get(module)
-    file, spec = getattr(loaded, "__file__", None), getattr(loaded, "__spec__", None)
+    loaded = vars(sys.modules[module]) if isinstance(sys.modules.get(module), ModuleType) else {}
+    file, spec = loaded.get("__file__"), loaded.get("__spec__")
     if file and is_elsewhere(file) and os.path.isfile(file) and (module not in _seen or _seen[module][0] is not spec):
         _seen[module] = spec, _stamp(file)
 
@@ -48,7 +48,9 @@ def check_unchanged(path: Path) -> None:
 
 
 def stamps() -> tuple[Stamp, ...]:
-    """Return what was seen, sorted: a process that saw something else runs other code."""
+    """Return the files of all modules of a user's own, sorted: a process that has seen others runs other code."""
+    for module in [*sys.modules]:
+        note(module)
     return tuple(sorted(stamp for _, stamp in _seen.values()))
 
 

@@ -7,6 +7,7 @@ import sysconfig
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from types import FrameType
 
@@ -62,6 +63,7 @@ def name_failures() -> Iterator[None]:
         raise GslError(line) from error
 
 
+@cache
 def is_elsewhere(file: str) -> bool:
     """Whether a file is none of gsl's, nor of Python and its packages."""
     return not any(folder in Path(file).parents for folder in (*FOLDERS, HOME))

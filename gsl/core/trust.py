@@ -7,7 +7,6 @@ of a module that `trust=` names. Whatever builds objects from plain data asks he
 from __future__ import annotations
 
 import importlib
-import os
 import re
 import sys
 from collections.abc import Callable, Collection, Iterator, Mapping
@@ -127,7 +126,6 @@ def class_of(name: Any, where: str = "") -> Any:
             reason = f"there is no module {error.name} in this folder or on Python's path"
         raise ConfigError(setting, f"cannot be loaded: {reason}", given=str(name)) from error
     if not is_ours(place):
-        _check_place(place, setting, str(name))
         note(place)
     target = getattr(module, attribute, None)
     if not isinstance(target, type):
@@ -135,17 +133,6 @@ def class_of(name: Any, where: str = "") -> Any:
     if is_ours(place) and not (is_dataclass(target) and is_ours(target.__module__)):
         raise ConfigError(setting, "is no component of gsl", given=str(name))
     return target
-
-
-def _check_place(module: str, setting: str, name: str) -> None:
-    """Refuse a module that was loaded from elsewhere than where it would be found now, in another folder."""
-    whole = module.partition(".")[0]
-    specs = (finder.find_spec(whole, None) for finder in sys.meta_path if hasattr(finder, "find_spec"))
-    there = getattr(next(filter(None, specs), None), "origin", None)
-    loaded = getattr(sys.modules.get(whole), "__file__", None)
-    if there and loaded and os.path.isfile(there) and os.path.realpath(there) != os.path.realpath(loaded):
-        problem = f"is loaded from {os.path.dirname(loaded)} already; start Python anew, or give it another name"
-        raise ConfigError(setting, problem, given=name)
 
 
 def _below(module: str, places: Collection[str]) -> bool:

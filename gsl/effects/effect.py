@@ -12,6 +12,7 @@ import pkgutil
 import re
 import sys
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from typing import Any, ClassVar, Literal, Protocol, get_origin, get_type_hints, runtime_checkable
@@ -47,7 +48,7 @@ class Effect(Protocol):
 
 
 _OWN: dict[str, type] = {}  # effects of a user's own in this process, by name
-_SEEN: dict[str, type] = {}  # all that this process has had: a world that is there keeps its own
+_SEEN: dict[str, type] = {}  # all that this process has had: worlds that are there have theirs
 _WITHHELD: dict[str, ConfigError] = {}  # those that may not be used, with what to do
 
 
@@ -76,14 +77,25 @@ def own() -> Mapping[str, type]:
 
 
 def own_of(effects: Mapping[str, Any]) -> Mapping[str, type]:
-    """Return the effects of a user's own among some by name, in use now or when their world was made."""
-    return {name: _SEEN[name] for name in effects if name in _SEEN}
+    """Return the classes of those among some effects by name that are a user's own, in use now or before."""
+    kinds = {name: kind for name, kind in _SEEN.items() if name not in _library()} | _OWN
+    return {name: kinds[name] for name in effects if name in kinds}
 
 
 def add_own(classes: Mapping[str, type]) -> None:
     """Have effects of a user's own beside those in use: a world that is there has them."""
     _OWN.update(classes)
     _SEEN.update(classes)
+
+
+@contextmanager
+def keep_own() -> Iterator[None]:
+    """Within, other effects of a user's own may be in use; afterwards those of before are."""
+    own, withheld = dict(_OWN), dict(_WITHHELD)
+    try:
+        yield
+    finally:
+        use_own(own, withheld)
 
 
 def withheld(name: str) -> ConfigError | None:
@@ -134,6 +146,8 @@ def effect_class(name: str) -> type[Any]:
         return _OWN[name]
     if name in _WITHHELD:
         raise _WITHHELD[name]
+    if name in _SEEN and name not in _library():
+        return _SEEN[name]
     if name not in names():
         near = find_alike(name, names())
         hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(names())}"

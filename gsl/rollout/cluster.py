@@ -177,7 +177,7 @@ def _run(work: bytes, frozen: bytes, place: Place, sources: str) -> bytes:
         try:
             if sources_hash() != sources:
                 raise GslError(f"worker on {socket.gethostname()}: has another gsl; install the same on all machines")
-            place.enter_elsewhere()
+            place.enter()
             with name_failures():
                 function, job = pickle.loads(work)  # noqa: S301  our own bytes, from whoever started the command
                 return pickle.dumps((function(frozen, job), None))

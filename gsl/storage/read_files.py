@@ -6,8 +6,10 @@ The source of a user's own class is one of them: after an edit of it an artifact
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass
+from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
@@ -63,9 +65,11 @@ def _source(kind: type) -> str | None:
         file = inspect.getsourcefile(kind)
     except (OSError, TypeError):
         file = None
-    if kind.__module__ == "__main__" and not (file and Path(file).is_file()):
-        problem = "has no file, and an artifact notes that of its components; put it into a module"
-        raise GslError(f"{kind.__qualname__} of a notebook or prompt {problem}")
-    if file:
+    if file and Path(file).is_file():
         check_unchanged(Path(file))
-    return file
+        return file
+    loaded = getattr(sys.modules.get(kind.__module__), "__file__", None) or ""
+    if loaded.endswith(tuple(EXTENSION_SUFFIXES)):
+        return None
+    problem = "has no file, and an artifact notes that of its components; put it into a module"
+    raise GslError(f"{kind.__qualname__}, of a notebook or prompt, {problem}")

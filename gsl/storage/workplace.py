@@ -169,23 +169,41 @@ class _Others(logging.Handler):
             root.handle(record)
 
 
+_hearing: list[tuple[int, _Others]] = []  # what was before, once for each file that is written
+_one = threading.Lock()
+
+
+def _begin_hearing(logger: logging.Logger) -> None:
+    with _one:
+        before = (logger.level, _Others(logger.getEffectiveLevel(), listening=logger.propagate))
+        if not _hearing:
+            logger.addHandler(before[1])
+            logger.setLevel(min(logger.level, logging.INFO) or logging.INFO)
+            logger.propagate = False
+        _hearing.append(_hearing[0] if _hearing else before)
+
+
+def _end_hearing(logger: logging.Logger) -> None:
+    with _one:
+        level, others = _hearing.pop()
+        if not _hearing:
+            logger.propagate = others.listening
+            logger.setLevel(level)
+            logger.removeHandler(others)
+
+
 @contextmanager
 def log_to(folder: Path) -> Iterator[logging.Logger]:
     """Write what gsl logs to the folder's log file, too; resumed work goes on in the same file."""
     logger = logging.getLogger("gsl")
     handler = _LogFile(folder / LOG, encoding="utf-8")
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(name)s: %(message)s"))
-    level, others = logger.level, _Others(logger.getEffectiveLevel(), listening=logger.propagate)
+    _begin_hearing(logger)
     logger.addHandler(handler)
-    logger.addHandler(others)
-    logger.setLevel(min(level, logging.INFO) or logging.INFO)
-    logger.propagate = False
     try:
         yield logger
     finally:
-        logger.propagate = others.listening
-        logger.removeHandler(others)
-        logger.setLevel(level)
+        _end_hearing(logger)
         logger.removeHandler(handler)
         handler.close()
 

@@ -60,6 +60,7 @@ class BulletWorld:
     def __post_init__(self) -> None:
         """Refuse periods that do not fit, and effects that do not exist or do not fit them."""
         check_periods(self.step, self.period)
+        _ = self.own_effects  # as they are now
         check_plant(self.plant, self.step, self.period)
         check_base(self.plant.robot, floating=self.floating)
         if self.servo_member and self.servo is None:
@@ -68,6 +69,11 @@ class BulletWorld:
             check_motors(nominal(robot(self.robot)), build(self.effects))
             if self.servo is not None:
                 raise ConfigError("servo", "acts on torques; velocity motors have none", given=self.servo)
+
+    @cached_property
+    def own_effects(self) -> Mapping[str, type]:
+        """Classes of its effects that are a user's own, by name, as they were when the world was made."""
+        return own_of(self.effects)
 
     @property
     def read_files(self) -> Mapping[str, Path]:
@@ -86,13 +92,11 @@ class BulletWorld:
         """Leave a plant with a torque hook out: a worker builds its own, as a hook need not be a module's function."""
         hooked = self.plant.hook is not None
         state = {name: value for name, value in vars(self).items() if not (hooked and name == "plant")}
-        classes = {**own_of(self.effects), **own()}
-        return {**state, OWN: classes} if classes else state
+        return {**state, OWN: own()} if own() else state
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         """Have effects of a user's own in a worker process too."""
-        if classes := state.pop(OWN, None):
-            add_own(classes)
+        add_own({**state.pop(OWN, {}), **state.get("own_effects", {})})
         vars(self).update(state)
 
     @property

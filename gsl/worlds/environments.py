@@ -89,7 +89,8 @@ def own_code(name: str) -> Any:
     """Return the class or function in `module:Class` of a user's own, if it is loaded."""
     module, _, word = name.partition(":")
     code = getattr(sys.modules.get(module), word, None) if own_module(name) else None
-    return code if getattr(code, "__qualname__", None) == word else None  # else nobody finds it by its name
+    home = sys.modules.get(getattr(code, "__module__", ""))
+    return code if getattr(home, getattr(code, "__qualname__", ""), None) is code else None  # or nobody finds it
 
 
 @contextmanager

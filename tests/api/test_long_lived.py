@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import logging
+import os
 import random
 import subprocess
 import sys
@@ -15,6 +16,7 @@ from types import ModuleType
 import gymnasium
 import numpy as np
 import pytest
+from commands import forget_modules
 from hydra import compose, initialize_config_dir
 from hydra.core.override_parser.overrides_parser import OverridesParser
 
@@ -23,6 +25,7 @@ from gsl.api.overrides import overrides
 from gsl.core.trajectory import Batch
 from gsl.errors import ConfigError, GslError
 from gsl.optimizers.random_state import keep_apart
+from gsl.policies.outside import read_once
 from gsl.storage.workplace import log_to
 
 pytestmark = pytest.mark.slow
@@ -64,6 +67,17 @@ try:
 except GslError as error:
     print(error)
 """
+ELSEWHERE = """
+import os, sys
+sys.path.insert(0, "")
+import gsl, task_of_mine
+os.chdir("other")
+world, said = gsl.make_world("nao_ideal"), []
+for workers in (1, 2):
+    log = gsl.roll_out(world, task_of_mine.Mine(), episodes=2, workers=workers)
+    said.append({float(reward) for reward in log.episodes[0].reward[1:]})
+print(*said)
+"""
 FEW = {"world": "nao_ideal", "task": "mine", "episodes": 1, "workers": 1}
 
 
@@ -75,8 +89,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     monkeypatch.setattr(sys, "dont_write_bytecode", True)
     rewarding(tmp_path, "1.0")
     yield tmp_path
-    for name in ("task_of_mine", "car_of_mine", "late_task"):
-        sys.modules.pop(name, None)
+    forget_modules(tmp_path)
 
 
 def rewarding(folder: Path, reward: str, module: str = "task_of_mine", code: str = TASK) -> None:
@@ -104,6 +117,24 @@ def test_a_class_that_is_defined_anew_acts_here_and_in_workers(home: Path) -> No
     rewarding(home, "2.50")
     importlib.reload(module)
     assert [rolled(module, workers) for workers in (1, 2)] == [{2.5}, {2.5}]
+
+
+def test_a_module_behind_it_that_is_loaded_anew_acts_in_workers_too(home: Path) -> None:
+    (home / "late_task.py").write_text("VALUE = 1.0\n")
+    rewarding(home, "late_task.VALUE", code=f"import late_task\n{TASK}")
+    module = importlib.import_module("task_of_mine")
+    assert rolled(module, 2) == {1.0}
+    (home / "late_task.py").write_text("VALUE = 2.50\n")
+    importlib.reload(sys.modules["late_task"])
+    importlib.reload(module)
+    assert [rolled(module, workers) for workers in (1, 2)] == [{2.5}, {2.5}]
+
+
+def test_workers_keep_a_module_of_the_folder_in_which_python_began(home: Path) -> None:
+    (home / "other").mkdir()
+    rewarding(home / "other", "9.0")
+    said = subprocess.run([sys.executable, "-"], input=ELSEWHERE, capture_output=True, text=True, cwd=home, check=True)
+    assert said.stdout == "{1.0} {1.0}\n"
 
 
 def test_an_environment_that_is_defined_anew_acts(home: Path) -> None:
@@ -145,9 +176,9 @@ def test_a_module_of_another_folder_is_not_taken_for_one_of_this(home: Path, mon
     monkeypatch.chdir(home / "A")
     made = gsl.run("collect", config_dir="conf", trust="task_of_mine", name="x", **FEW)
     monkeypatch.chdir(home / "B")
-    with pytest.raises(ConfigError, match=r"task\._target_ = task_of_mine\.Mine: is loaded from .*/A already"):
+    with pytest.raises(ConfigError, match=r"trust = task_of_mine: is loaded from .*/A already; start Python anew"):
         gsl.run("collect", config_dir="conf", trust="task_of_mine", name="x", **FEW)
-    assert str(home / "A") not in sys.path
+    assert sys.path.index(str(home / "B")) < sys.path.index(str(home / "A"))
     assert made.folder == home / "A/runs/x/collect_real" and made.metrics["episodes"] > 0
     sys.modules.pop("task_of_mine")
     gsl.run("collect", config_dir="conf", trust="task_of_mine", name="x", **FEW)
@@ -165,7 +196,7 @@ def test_worlds_keep_the_effects_that_they_were_made_with() -> None:
 def test_a_class_of_a_prompt_has_no_file_that_an_artifact_could_note(tmp_path: Path) -> None:
     code = TASK.replace("REWARD", "1.0") + PROMPT
     said = subprocess.run([sys.executable, "-"], input=code, capture_output=True, text=True, cwd=tmp_path, check=True)
-    assert said.stdout.startswith("Mine of a notebook or prompt has no file, and an artifact notes that of its comp")
+    assert said.stdout.startswith("Mine, of a notebook or prompt, has no file, and an artifact notes that of its co")
 
 
 def test_a_program_around_gsl_has_its_own_hydra(tmp_path: Path) -> None:
@@ -209,6 +240,31 @@ def test_a_learner_leaves_the_random_state_of_its_caller() -> None:
         seen.append(value)
         drawn.append(float(np.random.random()))  # noqa: NPY002
     assert (seen, drawn) == (alone, expected)
+
+
+def test_a_search_with_a_learner_leaves_it_too(home: Path) -> None:
+    pytest.importorskip("sb3_contrib")
+    np.random.seed(5)  # noqa: NPY002
+    before = np.random.get_state()  # noqa: NPY002
+    learner = {"steps": 64, "rollout": 32, "batch": 16, "envs": 1}
+    settings = {"task": "own_reward", "policy": "mlp", "grounding": "none", "optimizer": "trpo", "rollouts": 1}
+    settings |= {f"optimizer.{key}": value for key, value in learner.items()}
+    gsl.run(
+        "optimize", world="gymnasium", name="l", workers=1, **settings, **{"world.env_id": "MountainCarContinuous-v0"}
+    )
+    after = np.random.get_state()  # noqa: NPY002
+    assert [str(part) for part in before] == [str(part) for part in after]
+
+
+def test_a_file_of_the_same_name_and_time_in_another_folder_is_another(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name in ("A", "B"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "net.txt").write_text(name)
+        os.utime(tmp_path / name / "net.txt", ns=(10**18, 10**18))
+        monkeypatch.chdir(tmp_path / name)
+        assert read_once(Path.read_text, "net.txt") == name
 
 
 def test_a_program_hears_of_the_log_what_it_heard_before(tmp_path: Path) -> None:

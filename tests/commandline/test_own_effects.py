@@ -9,11 +9,12 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from commands import ENVIRONMENT, done, gsl, refused
+from commands import ENVIRONMENT, done, forget_modules, gsl, refused
 
 from gsl import make_world, run
 from gsl.commandline.help import write_help
@@ -50,7 +51,7 @@ class Magnet(ColdGrease):
 
 
 @pytest.fixture(scope="module")
-def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A user's folder with the page's example."""
     folder: Path = tmp_path_factory.mktemp("own")
     code = next(block for block in re.findall(r"```python\n(.*?)```", PAGE.read_text("utf-8"), re.S) if NAME in block)
@@ -58,7 +59,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / f"{MODULE}.py").write_text(code)
     (folder / "my_conf/effect").mkdir(parents=True)
     (folder / f"my_conf/effect/{NAME}.yaml").write_text(line)
-    return folder
+    yield folder
+    forget_modules(folder)
 
 
 @pytest.fixture(autouse=True)
@@ -136,6 +138,8 @@ def test_a_world_from_python_may_have_it(home: Path, monkeypatch: pytest.MonkeyP
     assert world.plant.servo.coulomb.min() == pytest.approx(0.1)
     make_world("nao_ideal")
     assert not own(), "another world has none of it"
+    changed = replace(world, effects={**world.effects, "zero_offset": {"offset": 0.01}})
+    assert changed.plant.servo.coulomb.min() == pytest.approx(0.1), "and whoever makes another of it has it"
     made = run("collect", world=world, name="still", episodes=1, workers=1, task={"duration": 0.1})
     assert NAME in made.artifact.config["world"]["effects"], "and it has it all the same"
     plain = run("collect", world="nao_ideal", name="plain", episodes=1, workers=1, task={"duration": 0.1})

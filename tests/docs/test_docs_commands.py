@@ -16,7 +16,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from commands import done
+from commands import done, forget_modules
 from pages import FENCE, GUIDES, ROOT, Command, commands
 
 from gsl.commandline.composer import compose
@@ -95,6 +95,7 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         sys.path.insert(0, str(folder))
         yield folder
         sys.path.remove(str(folder))
+        forget_modules(folder)
         use_own({})
 
 

@@ -65,6 +65,13 @@ def _files(folder: Path) -> list[Path]:
     return sorted(path for path in folder.rglob("*") if path.is_file())
 
 
+def forget_modules(folder: Path) -> None:
+    """Have a process that imported modules of a folder be as one that did not."""
+    for name, module in [*sys.modules.items()]:
+        if (file := getattr(module, "__file__", None)) and Path(file).is_relative_to(folder):
+            del sys.modules[name]
+
+
 @contextlib.contextmanager
 def ending(process: subprocess.Popen[str]) -> Iterator[None]:
     """End a process that leads a session, and its workers, with the block."""

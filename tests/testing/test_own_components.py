@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -322,6 +323,8 @@ def test_after_an_edit_of_ones_class_it_learns_anew(iterated: Path, home: Path) 
     (home / "mine/grounding/edited.yaml").write_text("_target_: own_edited.Shrink\nmodel: ''\n")
     done(*command, folder=home)
     path.write_text(GROUNDING.replace("real / sim", "sim / real"))
+    assert "own_edited.py: was changed after it was loaded" in refused(*command, folder=home, code=1)
+    importlib.reload(sys.modules["own_edited"])
     assert refused(*command, folder=home).startswith("runs/edited/train_grounding: was built otherwise")
 
 
