@@ -9,7 +9,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from commands import done, gsl, refused
+from commands import done, forget_modules, gsl, refused
 
 from gsl.core.described import describe, restore
 from gsl.core.layout import Layout
@@ -331,6 +331,7 @@ def test_a_function_that_returns_nonsense_is_refused_by_the_audit_and_by_an_epis
     audited = gsl("wiring", *base, folder=tmp_path)
     assert audited.code == 2 and said in " ".join(audited.out.split())
     assert said in gsl("collect", *base, "task=own_reward", "workers=1", folder=tmp_path).err
+    forget_modules(tmp_path)
 
 
 def test_a_network_that_makes_choices_is_evaluated_and_cannot_be_searched(tmp_path: Path) -> None:
