@@ -15,6 +15,7 @@ from gsl.core.seeds import derive_seed
 from gsl.core.setting import component, setting
 from gsl.core.trajectory import Batch
 from gsl.core.validation import make
+from gsl.effects.effect import keep_own
 from gsl.errors import ConfigError
 from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import size
@@ -34,6 +35,7 @@ class _Rolling:
     seed: Annotated[int, setting("of all randomness", ge=0)]
 
 
+@keep_own()
 def roll_out(
     world: World,
     task: Task | None = None,

@@ -36,7 +36,7 @@ def note(module: str) -> None:
         _seen[module] = spec, _stamp(file)
 
 
-def check_unchanged(path: Path) -> None:
+def check_contents(path: Path) -> None:
     """Refuse a file of a module that was loaded, if it is not what was loaded.
 
     Raises:

@@ -12,10 +12,10 @@ from pathlib import Path
 from types import FrameType
 
 from gsl.errors import GslError
+from gsl.version import PACKAGE
 
 OURS = "gsl"
 PACKAGES = (OURS, "gsl_experiments", "gsl_benchmarks")  # what fails in these is our fault and no user's
-HOME = Path(__file__).parents[1]
 FOLDERS = {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
 """Where Python and its packages lie: what fails there without a caller elsewhere is not a user's own."""
 
@@ -66,7 +66,7 @@ def name_failures() -> Iterator[None]:
 @cache
 def is_elsewhere(file: str) -> bool:
     """Whether a file is none of gsl's, nor of Python and its packages."""
-    return not any(folder in Path(file).parents for folder in (*FOLDERS, HOME))
+    return not any(folder in Path(file).parents for folder in (*FOLDERS, PACKAGE))
 
 
 def _is_own_frame(frame: FrameType) -> bool:

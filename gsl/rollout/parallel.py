@@ -149,7 +149,7 @@ def _arriving(function: Any, frozen: bytes, jobs: Sequence[Any], missing: Sequen
     parallel = joblib.Parallel(workers, batch_size=1, max_nbytes=None, return_as="generator_unordered", **more)
     try:
         with processes_starting():
-            run = joblib.delayed(partial(_run_numbered, function, frozen, Place.here()))
+            run = joblib.delayed(partial(_run_job, function, frozen, Place.here()))
             results = parallel(run(jobs[index], index) for index in missing)
         yield from results
     except TerminatedWorkerError:
@@ -162,7 +162,7 @@ def _begin_worker(parent: int, marks: str, loaded: Sequence[Stamp]) -> None:
     report_to(marks)
 
 
-def _run_numbered(function: Any, frozen: bytes, place: Place, job: Any, index: int) -> tuple[int, Any]:
+def _run_job(function: Any, frozen: bytes, place: Place, job: Any, index: int) -> tuple[int, Any]:
     place.enter()
     with name_failures():
         return index, function(frozen, job)

@@ -13,7 +13,7 @@ from importlib.machinery import EXTENSION_SUFFIXES
 from pathlib import Path
 from typing import Any
 
-from gsl.core.loaded import check_unchanged, note
+from gsl.core.loaded import check_contents, note
 from gsl.core.own_code import is_own
 from gsl.effects.effect import own
 from gsl.errors import GslError
@@ -38,7 +38,7 @@ def _find(thing: Any, where: str) -> Iterator[tuple[str, Path]]:
         parts = {field.name: getattr(thing, field.name) for field in fields(thing)}
         own: Mapping[str, Path] = getattr(thing, "read_files", {})
         for path in own.values():
-            check_unchanged(path)
+            check_contents(path)
         yield from ((f"{where}{name}", path) for name, path in own.items())
         sources = _sources(type(thing))
         if where:  # the stage itself is part of its identity, with its whole package
@@ -66,7 +66,7 @@ def _source(kind: type) -> str | None:
     except (OSError, TypeError):
         file = None
     if file and Path(file).is_file():
-        check_unchanged(Path(file))
+        check_contents(Path(file))
         return file
     loaded = getattr(sys.modules.get(kind.__module__), "__file__", None) or ""
     if loaded.endswith(tuple(EXTENSION_SUFFIXES)):

@@ -6,7 +6,6 @@ import importlib
 import importlib.util
 import logging
 import sys
-import sysconfig
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from functools import partial
@@ -16,12 +15,11 @@ from typing import Any
 import gymnasium
 
 from gsl.core.loaded import note
+from gsl.core.own_code import is_elsewhere
 from gsl.errors import ConfigError
-from gsl.version import PACKAGE
 from gsl.worlds.mujoco import without_remarks
 
 _log = logging.getLogger("gsl")
-_INSTALLED = (*(Path(sysconfig.get_path(name)) for name in ("stdlib", "purelib", "platlib")), PACKAGE)
 
 
 def make_environment(name: str, kwargs: Mapping[str, Any]) -> gymnasium.Env:
@@ -82,7 +80,7 @@ def own_module(name: str) -> Path | None:
     if spec is None or not spec.has_location or spec.origin is None:
         return None
     path = Path(spec.origin)
-    return None if any(path.is_relative_to(place) for place in _INSTALLED) else path
+    return path if is_elsewhere(str(path)) else None
 
 
 def own_code(name: str) -> Any:
