@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import functools
 import json
 import os
@@ -32,6 +31,7 @@ from gsl.core.interruption import end_with_parent
 from gsl.errors import GslError
 from gsl.report.console import Console
 from gsl.storage.documents import write_json
+from gsl.storage.leftovers import hold
 
 RESULT = "result.json"
 AT_WORK = "."  # how the name of hydra's folder begins while jobs run
@@ -58,14 +58,14 @@ def _sweep_folder(command: str) -> Iterator[Path]:
     """
     place = RUNS / ".multirun"
     with contextlib.ExitStack() as locks:
-        with _lock(Path(), wait=True):  # two multiruns that start at once
+        with hold(Path(), wait=True):  # two multiruns that start at once
             place.mkdir(parents=True, exist_ok=True)
             for left in place.glob(f"{AT_WORK}*"):
-                with _lock(left) as unused:
+                with hold(left) as unused:
                     if unused:
                         shutil.rmtree(left, ignore_errors=True)
             folder = Path(tempfile.mkdtemp(prefix=f"{AT_WORK}{command}-", dir=place))
-            locks.enter_context(_lock(folder))
+            locks.enter_context(hold(folder))
         try:
             yield folder
             if any(outcome["exit_code"] for outcome in _outcomes(folder)):
@@ -75,21 +75,6 @@ def _sweep_folder(command: str) -> Iterator[Path]:
             for emptied in (place, RUNS):
                 with contextlib.suppress(OSError):
                     emptied.rmdir()
-
-
-@contextlib.contextmanager
-def _lock(folder: Path, *, wait: bool = False) -> Iterator[bool]:
-    """Hold a folder if nobody else does, or wait for it; yield whether it is held."""
-    descriptor = os.open(folder, os.O_RDONLY)
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
-        held = True
-    except BlockingIOError:
-        held = False
-    try:
-        yield held
-    finally:
-        os.close(descriptor)
 
 
 def _launch(command: str, line: str, composition: Composition, folder: Path, *, json: bool) -> None:

@@ -1,9 +1,9 @@
-"""What a stage tells while it works: the interface of the console, and one that is silent."""
+"""What a stage says while it works: the interface of the console, which is silent itself."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import contextmanager
 from typing import Protocol
 
 from gsl.core.workload import Part
@@ -29,8 +29,8 @@ class LiveTable(Protocol):
         """Add a row."""
 
 
-class Console(Protocol):
-    """Where a stage says what it is at, and shows results."""
+class Console:
+    """Where a stage says what it is at, and shows results; this one shows nothing."""
 
     def status(self, text: str) -> None:
         """Say what is going on."""
@@ -40,8 +40,10 @@ class Console(Protocol):
     ) -> None:
         """Show a table of results."""
 
-    def at_work(self, name: str) -> AbstractContextManager[None]:
+    @contextmanager
+    def at_work(self, name: str) -> Iterator[None]:
         """Within, it is shown that work of this name goes on, from the first seconds on."""
+        yield
 
     def phase(self, name: str) -> None:
         """Say what is done now, of which nobody knows how long it takes."""
@@ -49,9 +51,12 @@ class Console(Protocol):
     @property
     def has_plan(self) -> bool:
         """Whether it was said how long the work around takes, or nobody listens: a part of it says nothing then."""
+        return True
 
-    def plan(self, noun: str, parts: Sequence[Part]) -> AbstractContextManager[None]:
+    @contextmanager
+    def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:
         """Within, the work, or a part of the plan around, consists of parts that `noun` names."""
+        yield
 
     def begin(self, name: str) -> None:
         """Say which part of the plan begins."""
@@ -59,65 +64,23 @@ class Console(Protocol):
     def finish(self, *, worked: bool = True) -> None:
         """Say that a part of the plan is done; without work if it was done before."""
 
-    def progress(self, total: int, description: str) -> AbstractContextManager[Progress]:
-        """Show how far a loop of `total` steps is."""
-
-    def live_table(self, title: str, columns: Sequence[str]) -> AbstractContextManager[LiveTable]:
-        """Show a table that grows."""
-
-    def part(self, name: str) -> AbstractContextManager[None]:
-        """Within, tables belong to a part of the work that has this name."""
-
-
-class Silent:
-    """A console that shows nothing."""
-
-    def status(self, text: str) -> None:
-        """Say nothing."""
-
-    def table(
-        self, title: str, columns: Sequence[str], rows: Sequence[Sequence[object]], caption: str | None = None
-    ) -> None:
-        """Show nothing."""
-
-    @contextmanager
-    def at_work(self, name: str) -> Iterator[None]:
-        """Show nothing."""
-        yield
-
-    def phase(self, name: str) -> None:
-        """Say nothing."""
-
-    @property
-    def has_plan(self) -> bool:
-        """Nobody listens."""
-        return True
-
-    @contextmanager
-    def plan(self, noun: str, parts: Sequence[Part]) -> Iterator[None]:
-        """Plan nothing."""
-        yield
-
-    def begin(self, name: str) -> None:
-        """Say nothing."""
-
-    def finish(self, *, worked: bool = True) -> None:
-        """Say nothing."""
-
     @contextmanager
     def progress(self, total: int, description: str) -> Iterator[Progress]:
-        """Yield progress that is shown nowhere."""
+        """Show how far a loop of `total` steps is."""
         yield _Unseen()
 
     @contextmanager
     def live_table(self, title: str, columns: Sequence[str]) -> Iterator[LiveTable]:
-        """Yield a table that is shown nowhere."""
+        """Show a table that grows."""
         yield _Unseen()
 
     @contextmanager
     def part(self, name: str) -> Iterator[None]:
-        """Name nothing."""
+        """Within, tables belong to a part of the work that has this name."""
         yield
+
+
+Silent = Console
 
 
 class _Unseen:

@@ -11,6 +11,7 @@ from contextlib import contextmanager, redirect_stdout, suppress
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from gsl.core.console import Console as Interface
 from gsl.core.console import LiveTable, Progress
 from gsl.core.interruption import checkpoint
 from gsl.core.visible import visible
@@ -48,7 +49,7 @@ def divert_prints(active: bool) -> Iterator[None]:
         os.close(kept)
 
 
-class Console:
+class Console(Interface):
     """Prints for a person, or exactly one JSON document on stdout.
 
     Attributes:

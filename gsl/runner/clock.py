@@ -7,23 +7,9 @@ time between two targets >= 0.9 period
 from __future__ import annotations
 
 import time
-from typing import Protocol
 
 LEAST = 0.9  # time between two targets, in periods
 SLACK = 1.0 - LEAST  # by which a tick may be late and the next still be due when it was, in periods
-
-
-class Time(Protocol):
-    """Where the time comes from."""
-
-    def restart(self) -> None:
-        """Let it be 0 now."""
-
-    def now(self) -> float:
-        """Return the time since `restart` [s]."""
-
-    def until(self, due: float) -> None:
-        """Wait until a time [s], not at all if it is over."""
 
 
 class Wall:
@@ -63,6 +49,9 @@ class Simulated:
     def until(self, due: float) -> None:
         """Let it be a time [s], without waiting."""
         self._now = max(self._now, due)
+
+
+Time = Wall | Simulated
 
 
 class Clock:

@@ -19,37 +19,31 @@ from gsl.storage.whole import replacing
 _NUMBERS = re.compile(r"\[\n *(?:(?:-?[0-9][0-9.eE+-]*|null),?\n *)+\]")  # no string of JSON holds a bare line end
 
 
-def plain(value: Any) -> Any:
-    """Return `value` in the types of JSON: arrays become lists, paths text, numbers those of Python."""
+def plain(value: Any, *, strict: bool = False) -> Any:
+    """Return `value` in the types of JSON: arrays become lists, paths text, numbers those of Python.
+
+    Args:
+        value: Of any depth.
+        strict: Whether a number that is not finite becomes null.
+    """
     match value:
         case Mapping():
-            return {str(key): plain(entry) for key, entry in value.items()}
+            return {str(key): plain(entry, strict=strict) for key, entry in value.items()}
         case list() | tuple():
-            return [plain(entry) for entry in value]
+            return [plain(entry, strict=strict) for entry in value]
         case np.ndarray() | np.generic():
-            return plain(value.tolist())
+            return plain(value.tolist(), strict=strict)
         case Path():
             return value.as_posix()
+        case float() if strict and not math.isfinite(value):
+            return None
         case _:
             return value
 
 
-def strict(value: Any) -> Any:
-    """Return `value` in the types of strict JSON, where a number that is not finite is null."""
-    match plain(value):
-        case dict() as entries:
-            return {key: strict(entry) for key, entry in entries.items()}
-        case list() as entries:
-            return [strict(entry) for entry in entries]
-        case float() as number if not math.isfinite(number):
-            return None
-        case other:
-            return other
-
-
 def text(value: Any, *, indent: int | None = None) -> str:
     """Return strict JSON with sorted keys: equal values give equal text."""
-    return json.dumps(strict(value), sort_keys=True, ensure_ascii=False, allow_nan=False, indent=indent)
+    return json.dumps(plain(value, strict=True), sort_keys=True, ensure_ascii=False, allow_nan=False, indent=indent)
 
 
 def write_json(path: Path, value: Any) -> None:

@@ -92,7 +92,7 @@ def remove(leftover: Leftover, runs: Path) -> bool:
     hidden = _HIDDEN.fullmatch(path.name)
     try:
         if path.parent.name == MULTIRUN:
-            with _hold(path) as free:
+            with hold(path) as free:
                 if not free:
                     return False
                 _erase(path)
@@ -144,22 +144,23 @@ def _walk(runs: Path) -> Iterator[tuple[Path, str]]:
 def _in_use(path: Path) -> bool:
     """Whether a process holds a file or folder."""
     try:
-        with _hold(path) as free:
+        with hold(path) as free:
             return not free
     except FileNotFoundError:
         return False
 
 
 @contextmanager
-def _hold(path: Path) -> Iterator[bool]:
+def hold(path: Path, *, wait: bool = False) -> Iterator[bool]:
+    """Hold a file or folder if nobody else does, or wait for it; yield whether it is held."""
     descriptor = os.open(path, os.O_RDONLY)
     try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        free = True
+        fcntl.flock(descriptor, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        held = True
     except BlockingIOError:
-        free = False
+        held = False
     try:
-        yield free
+        yield held
     finally:
         os.close(descriptor)
 

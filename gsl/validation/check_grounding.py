@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from gsl.core.interfaces import Trainable
+from gsl.core.interfaces import SIM, Trainable
+from gsl.grounding.preparation import MAKER
 from gsl.rollout.rollout import Scenario
+from gsl.storage.references import resolve
+from gsl.training.data import HELDOUT
+from gsl.validation.gat import compare
 from gsl.validation.gate import Gate, Passed, examine
-from gsl.validation.trained import check_trained
+from gsl.validation.uncharged import warn_uncharged
 
 
 def check_grounding(scenario: Scenario, gate: Gate) -> Passed:
@@ -16,5 +20,16 @@ def check_grounding(scenario: Scenario, gate: Gate) -> Passed:
     """
     grounding = scenario.grounding
     if isinstance(grounding, Trainable):
-        return check_trained(grounding, scenario, gate)
+        return _check_trained(grounding, scenario, gate)
     return examine(grounding, scenario, gate)
+
+
+def _check_trained(grounding: Trainable, scenario: Scenario, gate: Gate) -> Passed:
+    """Compare the grounded simulator with real trajectories that the grounding has not learned from."""
+    ready = scenario.prepare()
+    place = resolve(grounding.model, kind=MAKER)
+    heldout = (place.parent if place.is_file() else place) / HELDOUT
+    if scenario.world.layout.states or not heldout.is_file():
+        warn_uncharged(ready.world, gate.console, SIM, "the grounded action")
+        return Passed(ready, gate.check_falls(ready, "of the grounded simulator", "Collect more data"))
+    return compare(ready, heldout, gate)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 from gsl.core.interfaces import SIM
 from gsl.core.trajectory import Batch
@@ -37,26 +38,35 @@ def check_transformation(grounding: ActionTransformation, scenario: Scenario, ga
         return _check_values(replace(scenario, grounding=loaded), heldout, gate)
     if grounding.x == "auto":
         loaded = replace(loaded, x=_choose_joints(scenario, loaded, read(folder / VALIDATION), gate))
-    ready = replace(scenario, grounding=loaded)
     if grounding.alpha == "auto":
-        tried = {alpha: replace(ready, grounding=replace(loaded, alpha=alpha)) for alpha in ALPHAS}
-        ready = tried[
-            largest_stable(tried, gate.parameters, gate.seed_of("alpha"), allowed=count_allowed_falls(heldout))
-        ]
+        tried = {alpha: replace(scenario, grounding=replace(loaded, alpha=alpha)) for alpha in ALPHAS}
+        allowed = count_allowed_falls(heldout)
+        alpha = largest_stable(tried, gate.parameters, gate.seed_of("alpha"), allowed=allowed)
+        loaded = replace(loaded, alpha=alpha)
+    ready, judged = compare(replace(scenario, grounding=loaded), folder / HELDOUT, gate)
+    return Passed(ready, {"alpha": loaded.alpha, "x": loaded.x, **judged})
+
+
+def compare(ready: Scenario, file: Path, gate: Gate) -> Passed:
+    """Compare the grounded simulator with a file of real trajectories that are held out.
+
+    Raises:
+        Refused: It is not near enough, and `gate.accept` is not set.
+        TrajectoryError: Nothing can be compared with these trajectories.
+    """
     try:
-        report = check(ready, gate.parameters, heldout, gate.seed_of("check"))
+        report = check(ready, gate.parameters, read(file), gate.seed_of("check"))
     except InputError as error:
         if isinstance(error, TrajectoryError):
             raise
-        raise TrajectoryError(folder / HELDOUT, str(error)) from error
+        raise TrajectoryError(file, str(error)) from error
     gate.report(report.metrics())
-    show_report(report, gate)
+    _show_report(report, gate)
     gate.judge(report.problems, "Collect more data")
-    judged = {"grounding_acceptable": report.acceptable, "grounding_compared": bool(report.deviations)}
-    return Passed(ready, {"alpha": report.alpha, "x": loaded.x, **judged})
+    return Passed(ready, {"grounding_acceptable": report.acceptable, "grounding_compared": bool(report.deviations)})
 
 
-def show_report(report: GroundingReport, gate: Gate) -> None:
+def _show_report(report: GroundingReport, gate: Gate) -> None:
     """Show a report as a table and a figure, and what it lacks."""
     if report.deviations:
         grounding_errors(gate.folder / FIGURE, report.by_joint())
