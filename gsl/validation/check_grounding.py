@@ -6,6 +6,7 @@ from gsl.core.interfaces import SIM, Trainable
 from gsl.grounding.preparation import MAKER
 from gsl.rollout.rollout import Scenario
 from gsl.storage.references import resolve
+from gsl.storage.trajectories import read
 from gsl.training.data import HELDOUT
 from gsl.validation.gat import compare
 from gsl.validation.gate import Gate, Passed, examine
@@ -20,11 +21,11 @@ def check_grounding(scenario: Scenario, gate: Gate) -> Passed:
     """
     grounding = scenario.grounding
     if isinstance(grounding, Trainable):
-        return _check_trained(grounding, scenario, gate)
+        return _check_trainable(grounding, scenario, gate)
     return examine(grounding, scenario, gate)
 
 
-def _check_trained(grounding: Trainable, scenario: Scenario, gate: Gate) -> Passed:
+def _check_trainable(grounding: Trainable, scenario: Scenario, gate: Gate) -> Passed:
     """Compare the grounded simulator with real trajectories that the grounding has not learned from."""
     ready = scenario.prepare()
     place = resolve(grounding.model, kind=MAKER)
@@ -32,4 +33,4 @@ def _check_trained(grounding: Trainable, scenario: Scenario, gate: Gate) -> Pass
     if scenario.world.layout.states or not heldout.is_file():
         warn_uncharged(ready.world, gate.console, SIM, "the grounded action")
         return Passed(ready, gate.check_falls(ready, "of the grounded simulator", "Collect more data"))
-    return compare(ready, heldout, gate)
+    return compare(ready, read(heldout), heldout, gate)

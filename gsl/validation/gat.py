@@ -43,19 +43,19 @@ def check_transformation(grounding: ActionTransformation, scenario: Scenario, ga
         allowed = count_allowed_falls(heldout)
         alpha = largest_stable(tried, gate.parameters, gate.seed_of("alpha"), allowed=allowed)
         loaded = replace(loaded, alpha=alpha)
-    ready, judged = compare(replace(scenario, grounding=loaded), folder / HELDOUT, gate)
+    ready, judged = compare(replace(scenario, grounding=loaded), heldout, folder / HELDOUT, gate)
     return Passed(ready, {"alpha": loaded.alpha, "x": loaded.x, **judged})
 
 
-def compare(ready: Scenario, file: Path, gate: Gate) -> Passed:
-    """Compare the grounded simulator with a file of real trajectories that are held out.
+def compare(ready: Scenario, heldout: Batch, file: Path, gate: Gate) -> Passed:
+    """Compare the grounded simulator with real trajectories that are held out, and stand in a file.
 
     Raises:
         Refused: It is not near enough, and `gate.accept` is not set.
         TrajectoryError: Nothing can be compared with these trajectories.
     """
     try:
-        report = check(ready, gate.parameters, read(file), gate.seed_of("check"))
+        report = check(ready, gate.parameters, heldout, gate.seed_of("check"))
     except InputError as error:
         if isinstance(error, TrajectoryError):
             raise

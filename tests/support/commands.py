@@ -31,7 +31,7 @@ class Said(NamedTuple):
         return self.err.splitlines()
 
 
-PROGRESS = re.compile(r"\b\d+ % done|, \d+ (?:s|min)(?:, compiling.*)?$")
+PROGRESS = re.compile(r"(?:^|: )\d+ % done[,;]|, \d+ (?:s|min)(?:, compiling.*)?$")
 
 
 def gsl(*arguments: str, folder: Path) -> Said:
