@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -149,7 +148,7 @@ def robot(
     """Write the robot's URDF and a picture of it standing."""
     from gsl.commandline.robot_files import write_robot
 
-    write_robot(name, Path(out.removeprefix("out=")), Console(json=json))
+    write_robot(name, out, Console(json=json))
 
 
 _INIT = "also out=DIR, joints=A,B (controlled, in order), effort= [N·m] and velocity= [rad/s] where the URDF says none"

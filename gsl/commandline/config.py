@@ -17,13 +17,13 @@ from gsl.commandline.expansion import check_expansion
 from gsl.commandline.known_settings import plain, read_declared
 from gsl.commandline.overrides import COMMAND_KEYS, file_of
 from gsl.commandline.own_word import modules_of
+from gsl.commandline.unusual_effects import list_unusual
 from gsl.core.budget import within
 from gsl.core.console import Console
 from gsl.core.described import describe, restore
 from gsl.core.setting import component, setting
 from gsl.core.trust import TRUST, check_code
 from gsl.core.validation import make
-from gsl.effects.effect import list_unusual
 from gsl.errors import ArtifactError, ConfigError, InputError
 from gsl.rollout.cluster import Cluster, executing
 from gsl.storage.identity import flat

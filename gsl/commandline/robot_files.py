@@ -7,7 +7,7 @@ from pathlib import Path
 from gsl.commandline.own_word import find_own_modules
 from gsl.core.budget import holds
 from gsl.core.trust import modules_in
-from gsl.errors import InputError
+from gsl.errors import ConfigError, InputError
 from gsl.report.console import Console
 from gsl.report.render import portrait
 from gsl.robots.catalogue import robot
@@ -16,17 +16,22 @@ from gsl.robots.urdf import urdf
 from gsl.storage.whole import claim, explain_refusal
 
 
-def write_robot(name: str, folder: Path, console: Console) -> None:
+def write_robot(name: str, out: str, console: Console) -> None:
     """Write <name>.urdf and, of a robot that has shapes, <name>.png.
 
     Args:
         name: Of the robot, such as `nao`, or its file.
-        folder: Where to; made if it does not exist.
+        out: As it is typed, out=DIR or DIR: the folder, made if it does not exist.
         console: Where to say so.
 
     Raises:
+        ConfigError: if another setting is typed.
         InputError: if there is no such robot, its file describes none, or another file is in the way.
     """
+    key, equals, value = out.partition("=")
+    if equals and key != "out":
+        raise ConfigError(key, "gsl robot has one setting, out=DIR", given=value)
+    folder = Path(value if equals else out)
     find_own_modules(modules_in({"robot": name}))
     body = robot(name)
     model, picture = folder / f"{body.name}.urdf", folder / f"{body.name}.png"

@@ -18,7 +18,8 @@ from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.looks import look
 from gsl.diagnosis.search.plausibility import find_idle, refute
 from gsl.diagnosis.search.reference import Nominal, calibrate_on, clock_shift
-from gsl.diagnosis.search.stepwise import Search, Selection, Thresholds
+from gsl.diagnosis.search.selection import Selection, Thresholds
+from gsl.diagnosis.search.stepwise import Search
 from gsl.diagnosis.search.zeros import SHIFTS
 from gsl.diagnosis.settings import VerdictSettings
 from gsl.diagnosis.simulate.in_the_air import change

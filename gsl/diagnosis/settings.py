@@ -114,6 +114,7 @@ class SearchSettings:
 
     noise_cost: float = 0.96  # of a residual that is nothing but noise: 0.947 if exactly normal. Estimate
     gain: float = 20.0  # least gain of an effect: log-odds of 10, against some hundred candidates and scopes. Estimate
+    freed: float = 60.0  # of the cost of shifts, that is enough whatever chance gains: a shift of 8 spreads. Estimate
     chance: float = 1.3  # how far above the best gain of chance, of a few simulated nulls, an effect has to be
     walk_share: float = (
         0.1  # share of the cost that chance gains on the ground, where no log is simulated. Measured on walks

@@ -31,7 +31,6 @@ KINDS = ("command", "servo", "body", "contact", "environment", "sensor")
 TWINS = {"sensor_bias": "zero_offset"}  # alike by nature in the air (the design's section 4)
 
 Scope = str | tuple[str, ...]
-FAR = 3.0  # widths of a documented range; no value of a world that comes with gsl lies 2 from it
 PLACES = ("joints", "link")  # settings that say where an effect acts
 SCOPE = "where it acts: all, a group such as legs or arms, a joint, or a list of these"
 
@@ -164,27 +163,15 @@ def describe_confusion(name: str) -> str:
 
 def list_documented(name: str, robot: Robot) -> dict[str, Setting]:
     """Return the settings of an effect with the ranges that a robot documents, where they differ from a NAO's class."""
-    return _document(effect_class(name), robot.ranges.get(name, {}))
+    return narrow_settings(effect_class(name), robot.ranges.get(name, {}))
 
 
-def _document(kind: type[Any], own: Mapping[str, tuple[float, float]]) -> dict[str, Setting]:
+def narrow_settings(kind: type[Any], own: Mapping[str, tuple[float, float]]) -> dict[str, Setting]:
+    """Return the settings of a class of effects with other ranges, by parameter, in place of its own."""
     return {
         key: replace(setting, lower=own[key][0], upper=own[key][1]) if key in own else setting
         for key, setting in settings_of(kind).items()
     }
-
-
-def list_unusual(effects: Mapping[str, Any], robot: Robot) -> Iterator[str]:
-    """Yield a line on each value that lies far from its documented range: often a slip."""
-    for effect in build(effects):
-        name = name_of(effect)
-        for key, about in _document(type(effect), robot.ranges.get(name, {})).items():
-            value = getattr(effect, key)
-            if about.lower is None or about.upper is None or not isinstance(value, int | float):
-                continue
-            if max(about.lower - value, value - about.upper) > FAR * (about.upper - about.lower):
-                usual = f"{about.lower:g} to {about.upper:g} {about.unit}".rstrip()
-                yield f"effects.{name}.{key} = {value:g}: far from its documented range, {usual}"
 
 
 def check_ranges(name: str, ranges: Mapping[str, tuple[float, float]]) -> None:

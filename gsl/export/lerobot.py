@@ -1,4 +1,7 @@
-"""Trajectories as a LeRobot data set, v3.0: joint angles in degrees, as LeRobot's arms have them, no videos."""
+"""Trajectories as a LeRobot data set, v3.0: joint angles in degrees, as LeRobot's arms have them, no videos.
+
+Joints that slide stay in metres.
+"""
 
 from __future__ import annotations
 
@@ -61,7 +64,8 @@ def write_lerobot(folder: Path, batch: Batch, task: str) -> list[str]:
         "data_path": _DATA,
         "video_path": None,
         "features": features,
-        **({} if batch.states else {"angles": "deg"}),  # gsl's own entry: LeRobot has none
+        **({} if batch.states else {"angles": "deg"}),  # gsl's own entries: LeRobot has none
+        **({"slides": slides} if (slides := _slides(batch)) else {}),
     }
     _write_json(folder / "meta/info.json", info)
     arrays = {**vectors, "timestamp": times[:, None], **{name: counts[name][:, None] for name in _INDICES}}
@@ -79,7 +83,7 @@ def write_lerobot(folder: Path, batch: Batch, task: str) -> list[str]:
         "meta/episodes/file_index": [0] * len(lengths),
     }
     _write(folder / _EPISODES, pa.table(episodes), pq)
-    return list_omissions(batch, TIME, VELOCITY, REWARD, "robot")
+    return list_omissions(batch, TIME, VELOCITY, REWARD, "robot", "slides")
 
 
 def _vectors(batch: Batch) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
@@ -91,7 +95,7 @@ def _vectors(batch: Batch) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     def position(episode: Trajectory) -> np.ndarray:
         return episode.state if episode.state is not None else episode.position
 
-    turn = 1.0 if batch.states else DEGREES
+    turn = 1.0 if batch.states else np.where(np.isin(batch.joints, _slides(batch)), 1.0, DEGREES)
     state = [f"state.{k}" for k in range(batch.states)]
     vectors = {"observation.state": turn * stack(position), "action": turn * stack(lambda episode: episode.action)}
     names = {
@@ -111,6 +115,12 @@ def _vectors(batch: Batch) -> tuple[dict[str, np.ndarray], dict[str, Any]]:
     features["timestamp"] = {"dtype": "float32", "shape": [1], "names": None}
     features |= {name: {"dtype": "int64", "shape": [1], "names": None} for name in _INDICES}
     return vectors, features
+
+
+def _slides(batch: Batch) -> list[str]:
+    """Return the joints whose positions are in metres."""
+    slides = batch.metadata.get("slides") or []
+    return [joint for joint in batch.joints if joint in slides]
 
 
 def _statistics(values: np.ndarray) -> dict[str, list[float]]:

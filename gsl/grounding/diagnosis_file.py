@@ -99,7 +99,8 @@ def uncertain_causes(report: Mapping[str, Any]) -> Iterator[UncertainCause]:
 
 def _is(entry: Mapping[str, Any], cause: Mapping[str, Any]) -> bool:
     """Whether an entry of `effects:` is a cause's, whose numbers are not rounded."""
-    if "parameters" not in cause or cause["scope"] != entry.get("joints", entry.get("link", "")):
+    where = entry.get("joints", entry.get("link", ""))
+    if "parameters" not in cause or cause["scope"] != (where if isinstance(where, str) else ", ".join(where)):
         return False
     values = {**cause["fixed"], **{name: estimate["value"] for name, estimate in cause["parameters"].items()}}
     return all(_same(entry.get(name), value) for name, value in values.items())

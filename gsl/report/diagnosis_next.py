@@ -6,8 +6,8 @@ import shlex
 from pathlib import PurePosixPath
 from typing import NamedTuple
 
-from gsl.report.diagnosis_verdict import verdict
-from gsl.report.diagnosis_words import Document, entries, list_words, name, part, read_word
+from gsl.report.diagnosis_verdict import needs_calibration, verdict
+from gsl.report.diagnosis_words import Document, entries, level, list_words, name, part, read_word
 
 NOTHING = "no effect"  # as a document has it, beside an effect that the log cannot show
 
@@ -48,6 +48,10 @@ def _mending(document: Document) -> list[Step]:
 
 
 def _as_it_is(document: Document) -> Step:
+    if needs_calibration(document):
+        before = level(part(document, "shrinkage")["before"])
+        advice = f"Train in the calibrated simulator{_place(document)}{_yours(document)}: "
+        return Step(f"{advice}as it is, it is {before} the noise floor from the robot.", _training(document))
     advice = "Train in the simulator as it is: as far as this log shows, it is the robot."
     return Step(advice) if _own(document) else Step(advice, "gsl optimize grounding=none")
 

@@ -23,6 +23,7 @@ from gsl.report.diagnosis_words import (
 )
 
 GROUPS = 3  # that the headline names
+CLEAR = 2.0  # noise floors from which on a calibration is no detail
 VERDICTS = ("no_gap", "causes", "inseparable", "unknown", "wiring")
 
 
@@ -45,7 +46,13 @@ def _wiring(document: Document) -> str:
 
 
 def _no_gap(document: Document) -> str:
-    return "No gap beyond the noise"
+    calibrated = " and a calibration of each joint" if needs_calibration(document) else ""
+    return f"No gap beyond the noise{calibrated}"
+
+
+def needs_calibration(document: Document) -> bool:
+    """Whether the simulator as it is is clearly off the robot, on held-out records."""
+    return (finite(part(document, "shrinkage").get("before")) or 0.0) > CLEAR
 
 
 def _causes(document: Document) -> str:

@@ -25,6 +25,7 @@ from gsl.storage.importers.suspicions import (
 from gsl.storage.trajectory_contract import UNITS
 
 UNEVEN = 0.5  # of a period, by which a row may be early or late before a diagnosis refuses it
+SLIDE = 0.05  # what counts as a radian of a joint that slides [m]: no robot says how far it goes
 RATES = 0.1  # relative, by which episodes may differ in their rate
 SHOWN = 40  # rows of a table
 
@@ -58,7 +59,7 @@ def report(
         "warnings": [
             *(_words(doubt) for doubt in doubts if not doubt.refused),
             *_of_rates(episodes, period),
-            *_stuck(episodes),
+            *_stuck(episodes, sliding),
         ],
     }
 
@@ -129,7 +130,7 @@ def _commands(episodes: Sequence[Episode], k: int) -> list[np.ndarray]:
     return [episode.trajectory.action[:, k] for episode in episodes]
 
 
-def _stuck(episodes: Sequence[Episode]) -> Iterator[str]:
+def _stuck(episodes: Sequence[Episode], sliding: Collection[str]) -> Iterator[str]:
     for channel in _channels(episodes):
         if channel["saturated"] > STUCK:
             share = f"{100 * channel['saturated']:.0f} %"
@@ -139,7 +140,8 @@ def _stuck(episodes: Sequence[Episode]) -> Iterator[str]:
         others = [
             episode.trajectory.sensors.get(f"{group}.{joint}", 0.0) for episode in episodes for group in OTHER_COMMANDS
         ]
-        if all(np.ptp(commands) < MOVES for commands in [*_commands(episodes, k), *others]):
+        least = MOVES * (SLIDE if joint in sliding else 1.0)
+        if all(np.ptp(commands) < least for commands in [*_commands(episodes, k), *others]):
             yield f"action.{joint}: hardly ever changes, so that nothing can be learned of this joint"
 
 

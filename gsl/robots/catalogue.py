@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import os
 import pkgutil
 from pathlib import Path
 
@@ -43,6 +44,12 @@ def names() -> tuple[str, ...]:
 def is_file(name: str) -> bool:
     """Whether a name is that of a file."""
     return name.lower().endswith(SUFFIXES) or name.startswith(PREFIX)
+
+
+def see_from(name: str, folder: Path) -> str:
+    """Return a robot's name, its file as seen from a folder."""
+    is_seen = is_file(name) and not name.startswith(PREFIX)
+    return os.path.relpath(name, folder) if is_seen else name
 
 
 def files(name: str) -> tuple[Path, ...]:

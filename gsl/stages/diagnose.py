@@ -28,6 +28,7 @@ from gsl.diagnosis.verdict.findings import Findings, join_effects
 from gsl.diagnosis.verdict.limits import limits
 from gsl.errors import InputError
 from gsl.report.diagnosis import report_html
+from gsl.robots.catalogue import see_from as see_robot_from
 from gsl.rollout.parallel import Workers, threads
 from gsl.stages.audit import audit_log, write_wiring
 from gsl.storage import documents
@@ -172,9 +173,10 @@ class Diagnose:
         how = origin()  # what a reader types is typed where this command was, as the terminal has it
         (folder / PAGE).write_text(report_html(see_from(report, how.out) if how else report), encoding="utf-8")
         (folder / WORLD).parent.mkdir()
-        (folder / WORLD).write_text(self._world(findings, report["summary"]), encoding="utf-8")
+        sim = describe(self.sim) | {"robot": see_robot_from(self.sim.robot, folder)}  # this folder is its --config-dir
+        (folder / WORLD).write_text(self._world(sim, findings, report["summary"]), encoding="utf-8")
         if report["own"]:
-            plain = yaml.safe_dump(documents.plain(describe(self.sim)), sort_keys=False, allow_unicode=True)
+            plain = yaml.safe_dump(documents.plain(sim), sort_keys=False, allow_unicode=True)
             (folder / SIMULATOR).write_text(
                 f"# The simulator that was diagnosed, as it was.\n{plain}", encoding="utf-8"
             )
@@ -235,8 +237,8 @@ class Diagnose:
         """Return all effects of the diagnosed simulator, those that it had before included."""
         return join_effects(describe(self.sim)["effects"], findings.effects)
 
-    def _world(self, findings: Findings, summary: str) -> str:
-        config = describe(self.sim) | {"effects": self._effects(findings)}
+    def _world(self, sim: Mapping[str, Any], findings: Findings, summary: str) -> str:
+        config = {**sim, "effects": self._effects(findings)}
         text = yaml.safe_dump(documents.plain(config), sort_keys=False, allow_unicode=True)
         how = "with it switched on, and calibrated" if findings.answer.candidates else "calibrated"
         return f"# {summary}\n# The simulator {how} joint by joint.\n{text}"

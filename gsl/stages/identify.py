@@ -23,6 +23,7 @@ from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.diagnosis.simulate.simulator import Bench
 from gsl.diagnosis.verdict.findings import join_effects
+from gsl.robots.catalogue import see_from as see_robot_from
 from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.diagnosis_report import REPORT
@@ -83,7 +84,8 @@ class Identify:
             "shrinkage": {"before": before, "after": after},
         }
         documents.write_json(folder / REPORT, report)
-        world = describe(replace(self.sim, effects=join_effects(describe(self.sim)["effects"], effects)))
+        world = describe(self.sim) | {"effects": join_effects(describe(self.sim)["effects"], effects)}
+        world["robot"] = see_robot_from(self.sim.robot, folder)
         (folder / WORLD).parent.mkdir()
         text = yaml.safe_dump(documents.plain(world), sort_keys=False, allow_unicode=True)
         (folder / WORLD).write_text(f"# {summary}\n{text}", encoding="utf-8")

@@ -164,6 +164,7 @@ class Import:
             "units": own,
             "clocks": "synchronised" if self.mapping.synchronised else "unsynchronised",
             **{key: document[key] for key in ("time", "velocity")},
+            **({"slides": slides} if (slides := mapping.list_sliding(imported[0].joints)) else {}),
             "episodes": [dict(episode.label) for episode in imported],
         }
         return Batch(

@@ -25,6 +25,7 @@ from gsl.models.servo_file import FILE
 from gsl.models.servo_members import ServoMembers
 from gsl.report.servo_curves import servo_curves
 from gsl.report.servo_page import write_servo_page
+from gsl.robots.catalogue import see_from as see_robot_from
 from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.models import write_model
@@ -136,7 +137,9 @@ class TrainServo:
     def _write_world(self, folder: Path, learned: LearnedServo) -> None:
         place = destination(folder) / FILE
         text = yaml.safe_dump(
-            documents.plain(describe(replace(self.sim)) | {"servo": place.as_posix()}),
+            documents.plain(
+                describe(self.sim) | {"robot": see_robot_from(self.sim.robot, folder), "servo": place.as_posix()}
+            ),
             sort_keys=False,
             allow_unicode=True,
         )

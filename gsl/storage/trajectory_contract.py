@@ -75,6 +75,10 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
         lambda value: isinstance(value, list) and all(map(_is_label, value)),
         "a list of mappings, one an episode, with a name as `policy` and effects as `conditions`",
     ),
+    "slides": (
+        lambda value: isinstance(value, list) and all(isinstance(name, str) for name in value),
+        "a list of joints",
+    ),
     "action_noise": (lambda value: _is_number(value, 1e6), "a number"),
     "pi0_falls": (lambda value: _is_number(value, 1.0), "a share"),
     **dict.fromkeys(("cells", "choices"), (_is_count, "a number of them")),

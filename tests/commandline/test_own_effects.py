@@ -18,10 +18,11 @@ from commands import ENVIRONMENT, done, forget_modules, gsl, refused
 
 from gsl import make_world, run
 from gsl.commandline.help import write_help
+from gsl.commandline.unusual_effects import list_unusual
 from gsl.core.configuration import list_worlds
 from gsl.core.plant import nominal
 from gsl.diagnosis.hypothesis.candidates import library
-from gsl.effects.effect import apply_all, build, effect_class, list_unusual, names, own, use_own
+from gsl.effects.effect import apply_all, build, effect_class, names, own, use_own
 from gsl.errors import ConfigError
 from gsl.robots.nao import nao
 from gsl.testing import check_effect

@@ -75,3 +75,13 @@ def test_far_above_the_noise_a_tolerance_of_what_a_law_of_each_servo_leaves_is_p
         if "far above" in line
     )
     assert "record a motion twice" in caveat and "tolerance=0.02 [rad]" in caveat
+
+
+def test_where_little_is_left_it_is_asked_whether_that_matters() -> None:
+    unsure = replace(nothing_found(), verdict=Verdict("unknown", (), (), 0.98, 1.3, 0.1))
+    left = LEFT | {"nearest_fraction": 0.9996, "nearest_left": 0.00086}
+    (caveat,) = [line for line in caveats(unsure, (), left, []) if "beyond the noise" in line]
+    assert caveat.startswith("With the nearest effects and a calibration 99.9 % of the gap is gone.")
+    assert "0.86 mrad" in caveat and caveat.endswith("diagnose again with tolerance=0.002 [rad].")
+    far = caveats(unsure, (), left | {"nearest_fraction": 0.8}, [])
+    assert not any("beyond the noise" in line for line in far)

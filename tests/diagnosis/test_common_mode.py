@@ -17,7 +17,8 @@ from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.plausibility import find_idle
 from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.search.screening import extend
-from gsl.diagnosis.search.stepwise import Search, Thresholds
+from gsl.diagnosis.search.selection import Thresholds
+from gsl.diagnosis.search.stepwise import Search
 from gsl.diagnosis.simulate.calibration import COULOMB, KD, no_shifts
 from gsl.effects.effect import apply_all, build
 from gsl.robots.nao import nao
@@ -98,6 +99,28 @@ def test_a_gain_of_one_joint_is_named_beside_a_friction_of_all_though_the_calibr
     both = problem_of(effects).only(("coulomb_friction", "servo_gain"))
     chosen = Search(both, both.fit_calibration()).select().chosen
     assert chosen.places == {("coulomb_friction", "all"), ("servo_gain", "LShoulderPitch")}
+
+
+def test_a_joint_in_which_the_calibration_undoes_a_cause_is_no_part_of_it() -> None:
+    *soft, _ = NAO.groups["legs"]
+    legs = problem_of({"servo_gain": [{"kd": 0.5, "joints": joint} for joint in soft]}).only(("servo_gain",))
+    ((cause, value),) = Search(legs, legs.fit_calibration()).select().chosen.pairs
+    assert cause.joints(NAO) == soft and cause.scope == ", ".join(soft)
+    assert cause.entry(value)["kd"] == pytest.approx(0.5, rel=0.05)
+
+
+def test_what_frees_the_shifts_stands_whatever_chance_gains_on_residuals() -> None:
+    knee = problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
+    search = Search(knee, knee.fit_calibration(), Thresholds(gain=1e4))
+    assert search.select().chosen.places == {("servo_gain", "LKneePitch")}
+
+
+def test_calibration_alone_is_fitted_again_from_where_a_larger_hypothesis_ends(dry: Problem) -> None:
+    none = dry.fit_calibration()
+    stuck = dry.fit((), np.zeros(0), no_shifts(15), every=1, rounds=0)
+    larger, _ = extend(dry.only(("coulomb_friction",)), none, 1)
+    assert dry.relax(none, [replace(larger[0], fit=replace(larger[0].fit, cost=np.inf))]) is none
+    assert dry.relax(stuck, larger).fit.cost < stuck.fit.cost
 
 
 def test_no_lead_is_followed_twice() -> None:

@@ -16,6 +16,7 @@ from both_engines import PERIOD, window
 from commands import done
 from swinging_arm import KEPT, QUICK
 
+from gsl.commandline.unusual_effects import list_unusual
 from gsl.core.body import Joint, Link, Robot
 from gsl.core.plant import Plant, nominal
 from gsl.core.slides import in_angles, in_metres, levers, power, unit_of_slide
@@ -309,3 +310,11 @@ def test_other_units_are_asked_for_in_metres() -> None:
     fast = tuple(replace(episode, velocity=1000.0 * episode.velocity) for episode in log.episodes)
     with pytest.raises(InputError, match=r"velocities are in m/s, are these millimetres\?"):
         check_log(replace(log, episodes=fast), gantry(), "it")
+
+
+def test_a_value_of_joints_that_slide_is_held_against_its_range_in_their_units() -> None:
+    most = list_documented("armature", gantry())["inertia"].upper or 0.0
+    rail, swing = ({"armature": {"inertia": 5.0 * most, "joints": joint}} for joint in ("rail", "swing"))
+    assert not [*list_unusual(rail, gantry())] and [*list_unusual(swing, gantry())]
+    (line,) = list_unusual({"armature": {"inertia": 100.0 * most, "joints": "rail"}}, gantry())
+    assert line.endswith(f"to {most / SIZE**2:g} kg")

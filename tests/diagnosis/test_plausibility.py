@@ -18,7 +18,8 @@ from gsl.diagnosis.hypothesis.fit import Fit
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.search.plausibility import find_idle, refute
-from gsl.diagnosis.search.stepwise import Search, stands
+from gsl.diagnosis.search.selection import stands
+from gsl.diagnosis.search.stepwise import Search
 from gsl.diagnosis.settings import SearchSettings
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.verdict.document import document

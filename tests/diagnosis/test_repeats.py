@@ -52,6 +52,31 @@ def test_the_floor_of_such_repeats_is_that_of_the_noise(begun: float) -> None:
     assert floor.source == "repeats" and floor.sd == pytest.approx(NOISE, rel=0.25)
 
 
+COARSE = 0.0175  # a degree [rad]
+
+
+@pytest.mark.parametrize("white", [True, False])
+def test_a_coarse_encoder_is_noise_and_a_repeat_that_wanders_is_not(white: bool) -> None:
+    """Both differ far more from one repeat to the next than the others."""
+
+    def four(time: np.ndarray) -> np.ndarray:
+        return np.hstack([sines(time), sines(time)])
+
+    def logged(seed: int) -> Record:
+        time = PERIOD * np.arange(401)
+        position = four(time - LAG) + NOISE * np.random.default_rng(seed).standard_normal((401, 4))
+        wander = 0.03 * np.sin(0.9 * time + 2.0 * seed)
+        noisy = position[:, 3] + 0.3 * COARSE * np.random.default_rng(seed + 9).standard_normal(401)
+        position[:, 3] = COARSE * np.rint(noisy / COARSE) if white else position[:, 3] + wander
+        return Record("", four(time[:-1]), position, slope(position, PERIOD))
+
+    records = [logged(0), logged(1)]
+    floor = noise_floor(records, find_repeats(records, PERIOD), PERIOD, 1e-4)
+    assert floor.unsteady.tolist() == [False, False, False, not white]
+    assert floor.sd[:3] == pytest.approx(NOISE, rel=0.25)
+    assert (floor.sd[3] > 0.004) == white
+
+
 def test_another_motion_is_none() -> None:
     def larger(time: np.ndarray) -> np.ndarray:
         return 1.05 * sines(time)

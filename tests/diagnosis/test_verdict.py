@@ -16,7 +16,8 @@ from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Nominal
-from gsl.diagnosis.search.stepwise import Search, Selection
+from gsl.diagnosis.search.selection import Selection
+from gsl.diagnosis.search.stepwise import Search
 from gsl.diagnosis.settings import SearchSettings, VerdictSettings
 from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.verdict.self_test import Trial, measure_mistakes

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -65,6 +66,20 @@ def test_a_lerobot_data_set_is_imported_again(batch: Batch, tmp_path: Path) -> N
     again = read(tmp_path / "runs/again/import/trajectories.parquet")
     assert [joint.removesuffix(".pos") for joint in again.joints] == list(JOINTS)
     check_alike(again, batch, rows=0, precision=1e-6)
+
+
+def test_a_lerobot_data_set_has_slides_in_metres(batch: Batch, tmp_path: Path) -> None:
+    slider = JOINTS[1]
+    write(tmp_path / "log.parquet", replace(batch, metadata={**batch.metadata, "slides": [slider]}))
+    place = export(tmp_path, "lerobot")
+    frames = pd.read_parquet(place / "data/chunk-000/file-000.parquet")
+    states = np.stack(frames["observation.state"].tolist())[:40]
+    np.testing.assert_allclose(states[:, 1], batch.episodes[0].position[:40, 1], atol=1e-6)
+    np.testing.assert_allclose(states[:, 0], np.rad2deg(batch.episodes[0].position[:40, 0]), atol=1e-4)
+    done("import", f"source={place}", "name=again", "accept=true", folder=tmp_path)
+    again = read(tmp_path / "runs/again/import/trajectories.parquet")
+    check_alike(again, batch, rows=0, precision=1e-6)
+    assert again.metadata["slides"] == [again.joints[1]]
 
 
 def test_a_csv_is_imported_again(batch: Batch, tmp_path: Path) -> None:

@@ -125,6 +125,15 @@ def test_every_verdict_is_told(kind: str, phrases: tuple[str, ...]) -> None:
     assert [entry for entry in phrases if entry not in text] == []
 
 
+def test_where_a_calibration_explains_a_large_gap_the_calibrated_simulator_is_advised() -> None:
+    world = {"world_file": "runs/far/diagnose/world/diagnosed.yaml"}
+    far = made.no_gap() | world | {"shrinkage": made.no_gap()["shrinkage"] | {"before": 51.0}}
+    (step, *_) = steps(far)
+    assert step.why.startswith("Train in the calibrated simulator (") and "51 × the noise floor" in step.why
+    assert "world=diagnosed" in step.command
+    assert "No gap beyond the noise and a calibration of each joint" in words(report_html(far))
+
+
 def test_where_no_law_says_what_is_missing_a_grounding_learns_it() -> None:
     (step, *_) = steps(made.unknown() | {"forms": []})
     assert step.command == "gsl iterate grounding=gat"

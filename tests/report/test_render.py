@@ -158,7 +158,7 @@ def test_a_film_has_a_format(tmp_path: Path) -> None:
 
 
 def test_the_robot_command_names_its_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_robot("nao", tmp_path / "out", Console(json=True))
+    write_robot("nao", f"out={tmp_path / 'out'}", Console(json=True))
     document = json.loads(capsys.readouterr().out)
     assert [Path(name).name for name in document["files"]] == ["nao.urdf", "nao.png"]
     assert all(Path(name).stat().st_size > 1000 for name in document["files"])
@@ -166,7 +166,12 @@ def test_the_robot_command_names_its_files(tmp_path: Path, capsys: pytest.Captur
 
 def test_an_unknown_robot_is_named(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="did you mean nao"):
-        write_robot("nao6", tmp_path, Console())
+        write_robot("nao6", str(tmp_path), Console())
+
+
+def test_the_robot_command_takes_no_setting_for_a_folder(tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="one setting, out=DIR"):
+        write_robot("nao", "force=true", Console())
 
 
 @pytest.fixture(scope="module")

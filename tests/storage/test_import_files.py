@@ -242,6 +242,15 @@ def test_a_counter_that_begins_again_goes_on(tmp_path: Path, unit: str, top: flo
     check_same(imported(tmp_path, "log.csv", *settings), tolerance=1e-6)
 
 
+def test_rows_in_disorder_are_no_counter(tmp_path: Path) -> None:
+    """The clock of one of them jumps back by a full counter, that of others by less."""
+    top = 2.0**16
+    stamps = np.concatenate([TIME[:20] * 1e3, [top, 300.0, top - 500.0, 0.0], top + TIME[24:] * 1e3])
+    plain_csv(tmp_path, stamps)
+    line = refused("import", "source=log.csv", "mapping.time.unit=ms", folder=tmp_path)
+    assert "the clock jumps back" in line and "wrap" not in line and "sort its rows" in line
+
+
 def test_names_that_the_command_line_cannot_read_come_with_their_quotes(tmp_path: Path) -> None:
     plain_csv(tmp_path, TIME)
     for name in ("log(1).csv", "epoch=3-v1.csv"):

@@ -23,6 +23,7 @@ from gsl.effects.effect import effect_class, list_documented, names
 WIDE = 10.0  # ends of a range of shapes that are further apart, as a factor, are stepped in logarithms
 PROBE = 0.1  # share of the range at which an effect that acts in proportion is probed
 SLACK = 0.1  # share of a documented range by which a fit of a value near its end may miss it
+AND = ", "  # between the joints of a scope that has no word of its own
 NEVER_REPLAYED = ("torque_noise",)  # drawn anew in every episode: a replay has none
 
 
@@ -92,8 +93,9 @@ class Candidate:
 
     @property
     def scope(self) -> str:
-        """Where it acts, in a word."""
-        return str(self.fixed.get("joints", self.fixed.get("link", "")))
+        """Where it acts: a link, a word for joints, or joints with commas between."""
+        where = self.fixed.get("joints", self.fixed.get("link", ""))
+        return where if isinstance(where, str) else AND.join(where)
 
     def joints(self, robot: Robot) -> list[str]:
         """Return the controlled joints where it acts, none if that is elsewhere."""
@@ -108,9 +110,9 @@ class Candidate:
         """Return values of the free parameters, shape (..., p), as a reader is told them."""
         return values * [factor for factor, _ in self.say(robot)]
 
-    def on(self, joints: str) -> Candidate:
+    def on(self, scope: str) -> Candidate:
         """Return the same on other joints."""
-        return replace(self, fixed={**self.fixed, "joints": joints})
+        return replace(self, fixed={**self.fixed, "joints": scope.split(AND) if AND in scope else scope})
 
     def with_start(self, value: float | None) -> Candidate:
         """Return the same with one more value of its only parameter in the grid."""

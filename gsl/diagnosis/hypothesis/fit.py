@@ -15,7 +15,7 @@ import numpy as np
 from gsl.diagnosis.hypothesis.common_mode import Share, hand_over
 from gsl.diagnosis.log.residual import loss, weight
 from gsl.diagnosis.settings import FitSettings
-from gsl.diagnosis.simulate.calibration import PROBES, SPREADS, ZERO, clip_shifts, no_shifts, prior_cost
+from gsl.diagnosis.simulate.calibration import PROBES, SPREADS, ZERO, clip_shifts, no_shifts, prior_cost, prior_costs
 from gsl.diagnosis.simulate.in_the_air import Effects
 from gsl.diagnosis.simulate.simulator import Bench
 
@@ -67,7 +67,7 @@ def fit_shifts(z: np.ndarray, slopes: np.ndarray, at: np.ndarray, spread: float 
         right = -np.einsum("amj,mj->ja", columns, w * flat) - precision * at.T
         best = clip_shifts(at + np.linalg.solve(matrix, right[..., None])[..., 0].T)
         left = flat + np.einsum("amj,aj->mj", columns, best - at)
-    return best, loss(left).sum(axis=0) + ((best / sizes[:, None]) ** 2).sum(axis=0)
+    return best, loss(left).sum(axis=0) + prior_costs(best, spread)
 
 
 def fit_proportional(
@@ -184,16 +184,22 @@ class Descent:
         return here, matrix
 
     def _step(self, here: _Point, matrix: np.ndarray, right: np.ndarray) -> _Point:
-        """Return the first of the damped steps that descends well, else the best, else the point itself."""
-        p, best, most = len(here.theta), here, self.settings.parts
+        """Return the first of the damped steps that descends well, else the best, each joint damped as suits it."""
+        p, points, most = len(here.theta), [here], self.settings.parts
         for damping in self.settings.dampings:
             step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
             moved = np.where(self.ratios, here.theta * np.exp(np.clip(step[:p], -most, most)), here.theta + step[:p])
             shifts = clip_shifts(here.shifts + step[p:].reshape(here.shifts.shape))
-            best = min(best, self._point(np.clip(moved, *self.bounds), shifts), key=_cost)
-            if best.cost < (1.0 - self.settings.well) * here.cost:
-                break
-        return best
+            points.append(self._point(np.clip(moved, *self.bounds), shifts))
+            if points[-1].cost < (1.0 - self.settings.well) * here.cost:
+                return min(points, key=_cost)
+        best, each = min(points, key=_cost), np.argmin([self._by_joint(point) for point in points], axis=0)
+        mixed = np.stack([points[k].shifts[:, joint] for joint, k in enumerate(each)], axis=1)
+        return min(best, self._point(best.theta, mixed), key=_cost) if len({*each}) > 1 else best
+
+    def _by_joint(self, here: _Point) -> np.ndarray:
+        """Return what each joint's residuals and shifts cost, shape (n_joints,)."""
+        return np.asarray(loss(here.z).sum(axis=(0, 1)) + prior_costs(here.shifts, self._spread))
 
     def _relieve(self, here: _Point) -> _Point:
         """Hand over to the parameters what shifts share, if that costs less."""

@@ -103,23 +103,38 @@ class Problem:
         most = self.glances or (count // 2 if count > self.settings.few else count)
         return replace(self.train, pieces=self.train.pieces.take(spread(np.arange(count), most)))
 
+    def with_scope(self, scope: str, joints: np.ndarray) -> Problem:
+        """Return the problem with one more scope, of joints of shape (n_channels,)."""
+        return self._part(scopes={**self.scopes, scope: joints})
+
     def only(self, effects: Sequence[str]) -> Problem:
         """Return the problem with a part of the library."""
-        return self._part([part for part in self.library if part.effect in effects])
+        return self._part(library=tuple(part for part in self.library if part.effect in effects))
 
     def without(self, effects: Sequence[str] | Mapping[str, Any]) -> Problem:
         """Return the problem without a part of the library."""
-        return self._part([part for part in self.library if part.effect not in effects])
+        return self._part(library=tuple(part for part in self.library if part.effect not in effects))
 
-    def _part(self, library: Sequence[Candidate]) -> Problem:
-        """Return the problem with another library and the same memory: `replace` alone forgets."""
-        part = replace(self, library=tuple(library))
+    def _part(self, **other: Any) -> Problem:
+        """Return the problem with another library or scopes and the same memory: `replace` alone forgets."""
+        part = replace(self, **other)
         object.__setattr__(part, "memory", self.memory)
         return part
 
     def fit_calibration(self) -> Hypothesis:
         """Return the hypothesis without an effect."""
         return self.fit((), np.zeros(0), no_shifts(self.train.joints), every=1, rounds=2 * self.settings.fit.rounds)
+
+    def relax(self, none: Hypothesis, larger: Sequence[Hypothesis]) -> Hypothesis:
+        """Return calibration alone, also fitted from the shifts of the best larger hypothesis: what costs less there.
+
+        In a worse valley than that of a hypothesis with an effect, calibration would lack the effect by chance.
+        """
+        best = min((each.fit for each in larger), key=lambda fit: fit.cost, default=none.fit)
+        if best.cost >= none.fit.cost:
+            return none
+        again = self.fit((), np.zeros(0), best.shifts, every=1)
+        return again if again.fit.cost < none.fit.cost else none
 
     def fit(
         self,

@@ -23,7 +23,8 @@ class NoiseFloor:
     Attributes:
         sd: Standard deviation of a measured position [rad], shape (n_joints,).
         slow: Of its means over BLOCK ticks, by repeats; 0 without [rad], shape (n_joints,).
-        unsteady: Joints whose repeats differ by much more than those of the others, whose floor they get, (n_joints,).
+        unsteady: Joints whose repeats differ by much more than those of the others, and not by white noise; they get
+            the floor of the others, shape (n_joints,).
         source: `repeats` or `estimated`.
         pairs: Repeats that were compared.
         resolution: Of the encoders [rad].
@@ -84,7 +85,7 @@ def noise_floor(
         samples = sum(part.shape[1] * (len(part) - 1) for part in spread) * len(square)
         sd = np.maximum(np.sqrt(square), least)
         usual = np.inf if least.ndim else float(np.median(sd))
-        unsteady = sd > how.unsteady * usual
+        unsteady = (sd > how.unsteady * usual) & (sd > how.unsteadily * white)  # white noise is that of its own encoder
         restless |= wavers & (sd > how.unsteadily * white)  # what repeats as well shakes by no chance
         sd = np.where(unsteady, usual, sd)
         return NoiseFloor(sd, np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples, white, restless)

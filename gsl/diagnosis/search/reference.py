@@ -13,7 +13,8 @@ from gsl.diagnosis.hypothesis.hypothesis import by_cost
 from gsl.diagnosis.hypothesis.problem import LATENCY, Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Options
-from gsl.diagnosis.search.stepwise import Search, Thresholds
+from gsl.diagnosis.search.selection import Thresholds
+from gsl.diagnosis.search.stepwise import Search
 from gsl.diagnosis.simulate.calibration import no_shifts
 from gsl.diagnosis.simulate.in_the_air import Effects, change
 from gsl.diagnosis.simulate.simulator import simulator_of

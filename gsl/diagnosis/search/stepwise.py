@@ -8,81 +8,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gsl.diagnosis.hypothesis.common_mode import shares
-from gsl.diagnosis.hypothesis.hypothesis import Gain, Hypothesis, by_cost, gain
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
 from gsl.diagnosis.hypothesis.problem import Problem
-from gsl.diagnosis.search.screening import Screening, extend, screen
+from gsl.diagnosis.search.exempt import list_exemptions
+from gsl.diagnosis.search.screening import extend, screen
+from gsl.diagnosis.search.selection import Selection, Thresholds, stands
 from gsl.diagnosis.search.zeros import SHIFTS, explains_zeros, moves_zeros_alone, zeros_aside
 from gsl.diagnosis.settings import SearchSettings
 from gsl.diagnosis.simulate.calibration import SPREADS
-
-
-@dataclass(frozen=True)
-class Thresholds:
-    """What counts as more than chance, in units of cost.
-
-    Attributes:
-        gain: Of an effect over what stands without it.
-        share: Of the cost of what stands, that any effect has to explain; noise holds no such share, and is let be.
-    """
-
-    gain: float = SearchSettings.gain
-    share: float = 0.0
-
-
-@dataclass(frozen=True)
-class Selection:
-    """What a search came to.
-
-    Attributes:
-        none: Calibration without an effect.
-        chosen: The hypothesis that stands, maybe `none`.
-        tried: All hypotheses, best first, `none` among them.
-        screening: The first one; a diagnosis asks once more what is invisible, on top of the chosen hypothesis.
-        least: What an effect has to gain in cost here, to be more than chance.
-        rejected: Single effects that cost less than the first that stands, and do not stand themselves.
-    """
-
-    none: Hypothesis
-    chosen: Hypothesis
-    tried: tuple[Hypothesis, ...]
-    screening: Screening
-    least: float = 0.0
-    rejected: tuple[Hypothesis, ...] = ()
-
-    @property
-    def rivals(self) -> tuple[Hypothesis, ...]:
-        """All that may stand in the chosen one's place, best first."""
-        return tuple(fit for fit in self.tried if not any(fit is other for other in self.rejected))
-
-    @property
-    def gain(self) -> Gain:
-        """Of the chosen hypothesis over calibration alone."""
-        return gain(self.chosen, self.none)
-
-    def objection(self, hypothesis: Hypothesis) -> str | None:
-        """Return what speaks against a hypothesis that costs less than the chosen one, None if it costs no less."""
-        if hypothesis.cost >= self.chosen.cost or hypothesis.places == self.chosen.places:
-            return None
-        if any(hypothesis is other for other in self.rejected):
-            return "not significantly better than a calibration"
-        if gain(hypothesis, self.chosen).low <= 0.0:
-            return "not significantly better"
-        if not hypothesis.claims_its_names:
-            return "a value beyond its documented range"
-        return "little gain for another effect" if hypothesis.size > self.chosen.size else None
-
-
-def stands(hypothesis: Hypothesis, other: Hypothesis, least: float, flaw: float) -> bool:
-    """Whether a hypothesis is significantly better, on the residuals beyond a flaw or by freeing the shifts.
-
-    Over one with a value beyond its documented range it only has to be better, not significantly so: such a value does
-    the work of something else.
-    """
-    better, freed = gain(hypothesis, other), other.fit.prior_cost - hypothesis.fit.prior_cost
-    surely = better.low > 0.0 or (hypothesis.claims_its_names and not other.claims_its_names)
-    on_residuals = better.value - freed
-    beyond = freed + (max(0.0, on_residuals - flaw) if on_residuals > 0.0 else on_residuals)
-    return surely and beyond > least
 
 
 @dataclass
@@ -111,6 +44,7 @@ class Search:
         if self.nothing_left():
             return Selection(chosen, chosen, (chosen,), screen(self.problem, chosen), least)
         singles, screening = extend(self.problem, self.none, self._how.leads)
+        self.none = chosen = self.problem.relax(self.none, singles)
         if zeros_aside(self.problem, chosen):
             zeros = extend(self.problem.only(SHIFTS), chosen, self._how.leads)[0]
             seen = [single.places for single in singles]
@@ -118,8 +52,8 @@ class Search:
         rejected, standing = self.part_singles(singles, least)
         self.tried = [self.none, *singles]
         if standing:
-            chosen = self._grow(standing)
-            chosen = self.split(self._polish(self.prune(chosen)))
+            chosen = self._grow([self.exempt(standing[0]), *standing[1:]])
+            chosen = self.split(self.exempt(self._polish(self.prune(chosen))))
             if self.thresholds.share:
                 chosen = self._challenge(chosen)
             else:
@@ -197,7 +131,7 @@ class Search:
         """Whether a hypothesis stands against another one; zeros of many joints stand on grounds of their own."""
         if moves_zeros_alone(self.problem, hypothesis, other):
             return explains_zeros(self.problem, hypothesis, other)
-        return stands(hypothesis, other, least, flaw)
+        return stands(hypothesis, other, least, flaw, self._how.freed)
 
     def _bar(self, standing: Hypothesis) -> tuple[float, float]:
         """Return what a further effect has to gain over what stands, and what a flaw of the model may gain."""
@@ -208,7 +142,7 @@ class Search:
     def _lacking(self, standing: Hypothesis, level: float) -> bool:
         """Whether more is left than noise, or hidden in shifts; the cost of joints that shake does not show it."""
         few = float(standing.levels.max()) > self._how.room_of_one  # which a mean over all joints does not show
-        hides = self._most_to_free(standing) > self._how.hidden * self._bar(standing)[0]
+        hides = self._most_to_free(standing) > self._how.hidden * min(self._bar(standing)[0], self._how.freed)
         return standing.level > level or few or hides or bool(self.problem.train.comparison.shaking.any())
 
     def _most_to_free(self, standing: Hypothesis) -> float:
@@ -242,11 +176,23 @@ class Search:
         """Return a hypothesis without its k-th effect, fitted anew."""
         return self._fit(chosen, [index for index in range(chosen.size) if index != k])
 
+    def exempt(self, chosen: Hypothesis) -> Hypothesis:
+        """Take joints out of causes of many joints, where the calibration undoes what these do."""
+        for place, scope, joints, shifts in list_exemptions(self.problem, chosen):
+            self.problem = self.problem.with_scope(scope, joints)
+            candidates = tuple(part.on(scope) if k == place else part for k, part in enumerate(chosen.candidates))
+            fewer = self.problem.fit(candidates, chosen.start, shifts, every=1)
+            self.tried.append(fewer)
+            if stands(fewer, chosen, self._how.gain, self._bar(chosen)[1]):  # it is no effect more
+                return fewer
+        return chosen
+
     def split(self, chosen: Hypothesis) -> Hypothesis:
         """Give causes of all joints to the groups apart, where the calibration makes up for what these differ by."""
         problem, scopes = self.problem, self.problem.scopes
         size, count = problem.simulator.spread * SPREADS, problem.train.joints
-        groups = {name: mask for name, mask in scopes.items() if 1 < mask.sum() < count}
+        robot = problem.simulator.plant.robot
+        groups = {name: mask for name, mask in scopes.items() if name in robot.groups and 1 < mask.sum() < count}
         if not groups or not np.all(np.sum(list(groups.values()), axis=0) == 1):
             return chosen
         for k, candidate in enumerate(chosen.candidates):

@@ -53,9 +53,14 @@ def draw_shifts(rng: np.random.Generator, joints: int, spread: float = 1.0) -> n
     return result
 
 
+def prior_costs(shifts: np.ndarray, spread: float = 1.0) -> np.ndarray:
+    """Return what each joint's shifts, shape (7, n_joints), cost where they spread by a share of SPREADS."""
+    return np.asarray(((shifts / (spread * SPREADS[:, None])) ** 2).sum(axis=0))
+
+
 def prior_cost(shifts: np.ndarray, spread: float = 1.0) -> float:
-    """Return what shifts, shape (7, n_joints), cost where they spread by a share of SPREADS."""
-    return float(((shifts / (spread * SPREADS[:, None])) ** 2).sum())
+    """Return what all shifts, shape (7, n_joints), cost together."""
+    return float(prior_costs(shifts, spread).sum())
 
 
 def clip_shifts(shifts: np.ndarray) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
@@ -30,6 +31,8 @@ from gsl.diagnosis.verdict.zero_or_load import Droop
 
 LISTED = 3  # joints with their calibration in a sentence, which has to be read
 TOLERANCE = 0.02  # proposed where no law says what is left [rad]
+AMPLE = 1.5  # times what is left, that is proposed: within it nothing has to be explained
+NEARLY = 0.95  # share of the gap that goes with the nearest effects, from which on it is asked whether the rest matters
 
 
 def caveats(
@@ -44,7 +47,7 @@ def caveats(
         far: Parts of the log that are not explained, from `find_unexplained`.
     """
     about_fit = (_droops(findings, unsure), _remaining(findings, shrunk, far))
-    parts = (*about_fit, _log(findings), _joints(findings), _causes(findings))
+    parts = (*about_fit, _log(findings, shrunk), _joints(findings), _causes(findings))
     return [sentence for part in parts for sentence in part]
 
 
@@ -63,7 +66,7 @@ def _droops(findings: Findings, unsure: Sequence[Droop]) -> Iterator[str]:
         )
 
 
-def _log(findings: Findings) -> Iterator[str]:
+def _log(findings: Findings, shrunk: Mapping[str, Any]) -> Iterator[str]:
     log, tolerance = findings.log, findings.options.tolerance
     if findings.shift:
         yield f"The clocks are apart: {1e3 * findings.shift:.1f} ms were taken out first, so that no latency can show."
@@ -90,6 +93,8 @@ def _log(findings: Findings) -> Iterator[str]:
         yield f"Differences of {1e3 * tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
     elif findings.verdict.word == "unknown" and findings.verdict.remaining > findings.options.verdict.rough:
         yield _ask_for_a_floor(findings)
+    elif findings.verdict.word == "unknown" and (shrunk["nearest_fraction"] or 0.0) >= NEARLY:
+        yield _ask_what_matters(shrunk)
     elif findings.verdict.hollow:
         named = ", ".join(dict.fromkeys(findings.selection.chosen.names)).replace("_", " ")
         yield (
@@ -106,6 +111,17 @@ def _ask_for_a_floor(findings: Findings) -> str:
     return (
         f"What is left is far above the noise, so everything counts as an outlier: {twice}say with "
         f"tolerance={left:.1g} [rad] what does not matter."
+    )
+
+
+def _ask_what_matters(shrunk: Mapping[str, Any]) -> str:
+    """Propose a little more than the nearest effects leave as what does not matter, rounded up to one digit."""
+    left, gone = shrunk["nearest_left"], 100.0 * shrunk["nearest_fraction"]
+    digit = 10.0 ** math.floor(math.log10(AMPLE * left))
+    return (
+        f"With the nearest effects and a calibration {min(gone, 99.9):.3g} % of the gap is gone. What is left, "
+        f"{1e3 * left:.2g} mrad, is beyond the noise. If it does not matter, diagnose again with "
+        f"tolerance={math.ceil(AMPLE * left / digit) * digit:.1g} [rad]."
     )
 
 

@@ -17,7 +17,7 @@ from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Baseline
-from gsl.diagnosis.search.stepwise import Selection
+from gsl.diagnosis.search.selection import Selection
 from gsl.diagnosis.simulate.calibration import HALF_STEP, calibrate, to_effects
 from gsl.diagnosis.simulate.in_the_air import change
 from gsl.diagnosis.simulate.simulator import Simulator

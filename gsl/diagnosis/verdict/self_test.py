@@ -110,6 +110,7 @@ def simulate_nulls(log: Log, problem: Problem, none: Hypothesis, options: Option
         fake = repose(log, problem, replace(none, candidates=(), parameters=()), rng)
         base = fake.fit_calibration()
         singles, _ = extend(fake, base, NULL_LEADS)
+        base = fake.relax(base, singles)
         gains.append(base.cost - singles[0].cost if singles else 0.0)
         problem.tick("")
     return gains

@@ -25,6 +25,9 @@ FEW = 50  # residuals of a regime, of which fewer say nothing
 def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
     """Return the gap before and after, in floors, and the share of the excess that is gone, on held-out windows.
 
+    "nearest" is the best hypothesis, be it named or not: the share that goes with it, and what it leaves of the joint
+    that is furthest off [rad].
+
     Args:
         findings: The diagnosis.
         before: Replays of the simulator as it was [rad], shape (W, T, n_joints).
@@ -36,6 +39,10 @@ def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict
     z = {key: log.residual(replay) for key, replay in replays.items()}
     mean = {key: _mean_square(values[log.held_out], log.used) for key, values in z.items()}
     fraction, low, high = compute_removed(log, z["before"], z["after"])
+    nearest, chosen = z["after"], findings.selection.chosen
+    if chosen is not findings.answer:
+        nearest = log.residual(findings.simulator.simulate(chosen.effects, chosen.fit.shifts, log.pieces))
+    left = np.sqrt(_mean_square(nearest[log.held_out], log.used)) * log.comparison.floor
     return {
         "floor": 1.0,
         **{key: float(np.sqrt(value.mean())) for key, value in mean.items()},
@@ -43,6 +50,8 @@ def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict
         "calibration_fraction": compute_removed(log, z["before"], z["calibration"])[0],
         "low": low,
         "high": high,
+        "nearest_fraction": compute_removed(log, z["before"], nearest)[0],
+        "nearest_left": float(left.max()),
         "ceiling_fraction": ceiling(log, before, findings.laws),
         "by_joint": [
             {"joint": joint, "before": float(np.sqrt(mean["before"][k])), "after": float(np.sqrt(mean["after"][k]))}

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost, gain, name_in_place, share_of_excess
-from gsl.diagnosis.search.stepwise import Selection
+from gsl.diagnosis.search.selection import Selection
 from gsl.diagnosis.settings import SearchSettings, VerdictSettings
 from gsl.effects.effect import TWINS
 

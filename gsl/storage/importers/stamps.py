@@ -89,7 +89,10 @@ def _find_wrap(steps: np.ndarray, unit: str) -> float | None:
         unit: Of the stamps in the file.
     """
     own = factor(unit, "s") if unit != "iso" else 1.0
-    back, usual = -float(steps.min()), float(np.median(steps[steps >= 0.0], axis=0)) if (steps >= 0.0).any() else 0.0
+    backs, on = -steps[steps < 0.0], steps[steps >= 0.0]
+    back, usual = float(backs.max()), float(np.median(on)) if len(on) else 0.0
+    if np.ptp(backs) > NEAR * usual:  # rows in disorder jump back by this and that
+        return None
     for tick in dict.fromkeys((own, 1e-3, 1e-6, 1e-9)):
         for top in COUNTERS:
             if 0.0 <= top * tick - back <= NEAR * usual:

@@ -50,7 +50,10 @@ class Entry(NamedTuple):
 
 
 class DataSet(NamedTuple):
-    """A folder with meta/info.json; `angles` is what they are in, deg or percent, where it says so as gsl's do."""
+    """A folder with meta/info.json.
+
+    Where it says so, as gsl's do, `angles` is what they are in, deg or percent, and `slides` are joints in metres.
+    """
 
     folder: Path
     version: str
@@ -59,6 +62,7 @@ class DataSet(NamedTuple):
     widths: Mapping[str, int]
     episodes: tuple[Entry, ...]
     angles: str | None = None
+    slides: tuple[str, ...] = ()
 
     @property
     def files(self) -> list[Path]:
@@ -124,7 +128,9 @@ def open_data_set(folder: Path, memory: float) -> DataSet:
         entries.append(Entry(index, row["length"], folder / place, {**about, "episode_index": index, **task}, names))
     _check_files(folder, entries)
     angles = "deg" if info.get("angles") == "deg" else None
-    return DataSet(folder, version, robot, names, widths, tuple(entries), angles)
+    slides = info.get("slides")
+    metres = tuple(map(str, slides)) if isinstance(slides, list) else ()
+    return DataSet(folder, version, robot, names, widths, tuple(entries), angles, metres)
 
 
 def _read_info(folder: Path) -> dict[str, Any]:

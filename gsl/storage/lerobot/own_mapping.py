@@ -46,7 +46,8 @@ def own_mapping(data: DataSet, mapping: LogMapping, memory: float) -> tuple[LogM
     signals = {name: _signal(entries, own, scales) for name, own in zip(("action", "position"), columns, strict=True)}
     speeds = {joint: f"{VELOCITY}.{bare(entry)}.vel" for joint, entry in entries.items()}
     if data.angles and {*speeds.values()} <= {f"{VELOCITY}.{name}" for name in data.names.get(VELOCITY, ())}:
-        signals["velocity"] = Signal(column=dict(speeds), unit="deg/s")
+        units = {joint: "m/s" if scales[joint][0] == "m" else "deg/s" for joint in entries}
+        signals["velocity"] = Signal(column=dict(speeds), unit=units)
     joints = list(entries)
     own = dataclasses.replace(mapping, signals=signals, joints=joints, robot=arm or robot, time=Time(TIME, "s"))
     return own, [why, *notes]
@@ -154,7 +155,9 @@ def _scales(
     for joint, entry in entries.items():
         so = arm in ("so100", "so101")
         zero, sign = OLD_ZEROS.get(motor(entry), (0.0, 1.0)) if old and so and kind == "deg" else (0.0, 1.0)
-        if joint in grippers:
+        if data.angles and bare(entry) in data.slides:
+            scales[joint] = ("m", 1.0, 0.0, 1.0, 0.0)
+        elif joint in grippers:
             scales[joint] = _gripper(data, joint, ranges.get(joint), so)
         elif kind == "percent":
             scales[joint] = ("deg", ranges[joint] * STEP / 200.0, 0.0, 1.0, 0.0)
