@@ -21,6 +21,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.policies.policy import size
 from gsl.rollout.parallel import Job, Workers, trajectories
 from gsl.rollout.rollout import Scenario
+from gsl.worlds.slides import list_slides
 
 PI0 = "pi0"
 
@@ -87,6 +88,7 @@ def roll_out(
         "policy": describe(family),
         "grounding": f"{type(grounding).__module__}.{type(grounding).__qualname__}",
         "action_noise": 0.0,
+        **({"slides": slides} if (slides := list_slides(world)) else {}),
         **({"cells": layout.cells, "choices": layout.choices} if layout.states else {}),
         "episodes": [{"policy": label, "parameters": chosen.tolist()} for _ in jobs],
     }

@@ -34,5 +34,5 @@ def _in_metres(about: Setting, sizes: list[float]) -> tuple[float, float, str]:
     assert about.lower is not None and about.upper is not None
     if not sizes:
         return about.lower, about.upper, about.unit
-    factors = [size ** -power(about.unit) for size in sizes]
-    return about.lower * min(factors), about.upper * max(factors), unit_of_slide(about.unit)
+    ends = [end * size ** -power(about.unit) for end in (about.lower, about.upper) for size in sizes]
+    return min(ends), max(ends), unit_of_slide(about.unit)

@@ -172,6 +172,7 @@ def _judge(log: Log, rivals: Sequence[Hypothesis], trials: Sequence[Trial], opti
         log.noise.source != "repeats" and not options.tolerance,
         how,
         noise_cost,
+        options.search.freed,
     )
 
 

@@ -88,7 +88,8 @@ def self_test(document: Document) -> Markup | None:
     if gain is not None:
         saved = f"{short(gain)} in cost at most" if gain > 0.0 else "nothing"
         null = f" Where nothing was wrong, chance saved {saved}"
-        null += f"; an effect has to save {short(least)}." if least is not None else "."
+        more = f"; an effect has to save {short(least)}, or to free much of the calibration's cost."
+        null += more if least is not None else "."
     return section(
         "Self-test",
         table(("true cause", "answer", "cases"), rows) if rows else None,

@@ -30,6 +30,7 @@ _AXES: Mapping[str, str] = {
     "reversal": "way since it turned round [rad]",
     "time": "time in the episode [s]",
 }
+LEAST = 5e-4  # of a lag that is written in whole milliseconds [s]
 ALIKE = 0.9  # share of the best form's share from which on another one does as well
 
 
@@ -49,6 +50,7 @@ def _words(form: Document) -> str:
     most, late = finite(shares.get(best)) or 0.0, finite(form.get("late"))
     others = [key for key in shares if key != best and (finite(shares[key]) or 0.0) > ALIKE * most > 0.0]
     words = [WORDS.get(key, name(key)) for key in (best, *others)]
+    late = late if late is None or abs(late) >= LEAST else None
     by = f" ({_milliseconds(late)})" if late is not None and "lag" in (best, *others) else ""
     return list_words(words, "or") + by
 

@@ -49,9 +49,10 @@ def _mending(document: Document) -> list[Step]:
 
 def _as_it_is(document: Document) -> Step:
     if needs_calibration(document):
-        before = level(part(document, "shrinkage")["before"])
+        before, after = (level(part(document, "shrinkage")[key]) for key in ("before", "after"))
         advice = f"Train in the calibrated simulator{_place(document)}{_yours(document)}: "
-        return Step(f"{advice}as it is, it is {before} the noise floor from the robot.", _training(document))
+        far = f"as it is, it is {before} the noise floor from the robot, calibrated {after}."
+        return Step(advice + far, _training(document))
     advice = "Train in the simulator as it is: as far as this log shows, it is the robot."
     return Step(advice) if _own(document) else Step(advice, "gsl optimize grounding=none")
 

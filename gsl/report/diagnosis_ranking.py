@@ -65,8 +65,8 @@ def ranking(document: Document) -> Markup | None:
     note = (
         f"Each was fitted on some records and judged on others. Shown: {measure}, with its 95 % interval (left of the "
         "line it makes things worse). What costs more does so than the verdict, which is in colour. An effect has "
-        f"to save {least:,.0f} over calibration alone here, to be more than chance; how sure a difference between two "
-        "explanations is, is the probability of the causes."
+        f"to save {least:,.0f} over calibration alone here, or to free much of what its unusual values cost; how sure "
+        "a difference between two explanations is, is the probability of the causes."
     )
     rest = f"{len(hypotheses) - SHOWN} more did worse." if len(hypotheses) > SHOWN else None
     return section(

@@ -23,6 +23,7 @@ from gsl.report.diagnosis_words import (
 )
 
 GROUPS = 3  # that the headline names
+NEARER = 0.5  # share of the gap, below which a calibration has to take it to be advised
 CLEAR = 2.0  # noise floors from which on a calibration is no detail
 VERDICTS = ("no_gap", "causes", "inseparable", "unknown", "wiring")
 
@@ -51,8 +52,9 @@ def _no_gap(document: Document) -> str:
 
 
 def needs_calibration(document: Document) -> bool:
-    """Whether the simulator as it is is clearly off the robot, on held-out records."""
-    return (finite(part(document, "shrinkage").get("before")) or 0.0) > CLEAR
+    """Whether the simulator as it is is clearly off the robot, and much nearer with its calibration."""
+    before, after = (finite(part(document, "shrinkage").get(key)) or 0.0 for key in ("before", "after"))
+    return before > CLEAR and after < NEARER * before
 
 
 def _causes(document: Document) -> str:
@@ -92,6 +94,8 @@ def cause_name(cause: Document) -> str:
     """Return an effect, where it acts, and what else was chosen of it (the side of a joint's limit, say)."""
     where = cause.get("scope")
     acts = scope(cause.get("joints") if where is None else where)
+    if exempt := entries(cause, "exempt"):
+        acts = f"all joints but {list_words(list(map(str, exempt)))}"
     chosen = [
         f"{name(key)} {choice}"
         for key, choice in part(cause, "fixed").items()

@@ -47,9 +47,10 @@ def is_file(name: str) -> bool:
 
 
 def see_from(name: str, folder: Path) -> str:
-    """Return a robot's name, its file as seen from a folder."""
-    is_seen = is_file(name) and not name.startswith(PREFIX)
-    return os.path.relpath(name, folder) if is_seen else name
+    """Return a robot's name, its file as seen from a folder; an absolute path as it is."""
+    if not is_file(name) or name.startswith(PREFIX) or Path(name).is_absolute():
+        return name
+    return os.path.relpath(Path(name).resolve(), folder.resolve())
 
 
 def files(name: str) -> tuple[Path, ...]:

@@ -30,8 +30,8 @@ from gsl.rollout.rollout import Scenario
 from gsl.storage.policy_choice import PolicyChoice
 from gsl.storage.trajectories import write
 from gsl.validation.iteration_pictures import read_footfalls
-from gsl.worlds.bullet import BulletWorld
 from gsl.worlds.external import ExternalRobot
+from gsl.worlds.slides import list_slides
 
 FILE = "trajectories.parquet"
 
@@ -89,7 +89,7 @@ class Collect:
             "world": describe(self.world),
             "policy": describe(self.policy),
             "action_noise": self.action_noise,
-            **({"slides": list(slides)} if (slides := self._slides()) else {}),
+            **({"slides": slides} if (slides := list_slides(self.world)) else {}),
             **({"cells": layout.cells, "choices": layout.choices} if layout.states else {}),
             "episodes": [
                 {"policy": piece.label, "parameters": piece.parameters.tolist(), **piece.about} for piece in pieces
@@ -112,12 +112,7 @@ class Collect:
     def _write_page(self, folder: Path, batch: Batch, own: int) -> None:
         walk = read_footfalls("the first episode", batch.episodes[0])
         unit, noisy = Unit.of(self.task), bool(self.action_noise)
-        write_collection_page(folder, batch, own, unit, noisy=noisy, walk=walk, slides=self._slides())
-
-    def _slides(self) -> tuple[str, ...]:
-        """Return the logged joints that slide, whose positions are in metres."""
-        robot = self.world.plant.robot if isinstance(self.world, BulletWorld) else None
-        return () if robot is None else tuple(name for name in robot.slides if name in robot.controlled)
+        write_collection_page(folder, batch, own, unit, noisy=noisy, walk=walk, slides=list_slides(self.world))
 
     def _play(self, scenario: Scenario, pieces: Sequence[Piece], console: Console) -> list[Trajectory]:
         """Return the episodes, of a robot somewhere else from its answer."""

@@ -149,8 +149,8 @@ class Import:
         derived = sum(episode.derived for episode in imported)
         which = "" if derived in (0, len(imported)) else f" in {derived} of {len(imported)} episodes"
         velocity = f"derived from positions{which}" if derived else "as logged"
-        sliding = self.mapping.list_sliding(first.joints)
-        document = report(imported, files, period, self.mapping.turning, sliding)  # a data set says this of no joint
+        sliding = chosen.mapping.list_sliding(first.joints)
+        document = report(imported, files, period, self.mapping.turning, sliding)  # a data set says that of no joint
         remarks = dict.fromkeys(remark for episode in imported for remark in episode.remarks)
         warnings = [*remarks, *document["warnings"], *list_unmatched(imported, self.mapping)]
         return {**document, "warnings": warnings, "notes": chosen.notes, "time": kept, "velocity": velocity}

@@ -74,6 +74,7 @@ def _is_cause(cause: Any) -> bool:
         and all(map(_is_by_name, parameters.values()))
         and _is_names(joints)
         and isinstance(cause.get("scope") or "", str)
+        and _is_names(cause.get("exempt") or [])
         and _is_by_name(cause.get("fixed") or {})
         and isinstance(cause.get("effect") or "", str)
     )

@@ -17,7 +17,7 @@ from gsl.diagnosis.verdict.verdict import Verdict
 
 pytestmark = pytest.mark.slow
 
-LEFT: dict[str, Any] = {"fraction": 0.63}
+LEFT: dict[str, Any] = {"fraction": 0.63, "nearest_fraction": 0.63, "nearest_left": 0.01}
 NAMED = Verdict("causes", (), (), 0.97, 1.0, 1.0)
 
 
@@ -81,7 +81,8 @@ def test_where_little_is_left_it_is_asked_whether_that_matters() -> None:
     unsure = replace(nothing_found(), verdict=Verdict("unknown", (), (), 0.98, 1.3, 0.1))
     left = LEFT | {"nearest_fraction": 0.9996, "nearest_left": 0.00086}
     (caveat,) = [line for line in caveats(unsure, (), left, []) if "beyond the noise" in line]
-    assert caveat.startswith("With the nearest effects and a calibration 99.9 % of the gap is gone.")
+    assert caveat.startswith("With a calibration 99.9 % of the gap is gone.")
     assert "0.86 mrad" in caveat and caveat.endswith("diagnose again with tolerance=0.002 [rad].")
     far = caveats(unsure, (), left | {"nearest_fraction": 0.8}, [])
-    assert not any("beyond the noise" in line for line in far)
+    hollow = caveats(replace(unsure, verdict=replace(unsure.verdict, hollow=True)), (), left, [])
+    assert not any("beyond the noise" in line for line in [*far, *hollow])

@@ -55,8 +55,8 @@ def test_the_floor_of_such_repeats_is_that_of_the_noise(begun: float) -> None:
 COARSE = 0.0175  # a degree [rad]
 
 
-@pytest.mark.parametrize("white", [True, False])
-def test_a_coarse_encoder_is_noise_and_a_repeat_that_wanders_is_not(white: bool) -> None:
+@pytest.mark.parametrize("dither", [0.3, 0.0, None])
+def test_a_coarse_encoder_is_noise_and_a_repeat_that_wanders_is_not(dither: float | None) -> None:
     """Both differ far more from one repeat to the next than the others."""
 
     def four(time: np.ndarray) -> np.ndarray:
@@ -66,15 +66,15 @@ def test_a_coarse_encoder_is_noise_and_a_repeat_that_wanders_is_not(white: bool)
         time = PERIOD * np.arange(401)
         position = four(time - LAG) + NOISE * np.random.default_rng(seed).standard_normal((401, 4))
         wander = 0.03 * np.sin(0.9 * time + 2.0 * seed)
-        noisy = position[:, 3] + 0.3 * COARSE * np.random.default_rng(seed + 9).standard_normal(401)
-        position[:, 3] = COARSE * np.rint(noisy / COARSE) if white else position[:, 3] + wander
+        noisy = position[:, 3] + (dither or 0.0) * COARSE * np.random.default_rng(seed + 9).standard_normal(401)
+        position[:, 3] = position[:, 3] + wander if dither is None else COARSE * np.rint(noisy / COARSE)
         return Record("", four(time[:-1]), position, slope(position, PERIOD))
 
     records = [logged(0), logged(1)]
     floor = noise_floor(records, find_repeats(records, PERIOD), PERIOD, 1e-4)
-    assert floor.unsteady.tolist() == [False, False, False, not white]
+    assert floor.unsteady.tolist() == [False, False, False, dither is None]
     assert floor.sd[:3] == pytest.approx(NOISE, rel=0.25)
-    assert (floor.sd[3] > 0.004) == white
+    assert (floor.sd[3] > 0.004) == (dither is not None)
 
 
 def test_another_motion_is_none() -> None:

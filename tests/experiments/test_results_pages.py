@@ -158,7 +158,7 @@ def test_the_guide_tells_gains_and_falls_of_the_trials() -> None:
         trial._replace(method="learned in this world itself") for trial in trials_of("table2_in_weak", "table2_in_worn")
     ]
     loaded = [trial for trial in trials_of("servo") if trial.method == "servo_torque_noise"]
-    bare = [trial for trial in trials_of("servo_weak", "servo_worn") if trial.method == "servo"]
+    bare = [trial for trial in trials_of("servo_weak", "servo_worn", "servo_harsh") if trial.method == "servo"]
     elsewhere = {"`nao_worn`, its causes withheld": trials_of("withheld")}
     count = 0
     for named, *cells in rows:
@@ -173,7 +173,7 @@ def test_the_guide_tells_gains_and_falls_of_the_trials() -> None:
             )
             assert cell == (f"{gain:.1f} ({fell:.0f})" if own else ""), (method, title)
             count += bool(cell)
-    assert count == 37
+    assert count == 38
 
 
 def by_number(study: Any) -> dict[int, set[str]]:

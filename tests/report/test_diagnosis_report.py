@@ -127,7 +127,7 @@ def test_every_verdict_is_told(kind: str, phrases: tuple[str, ...]) -> None:
 
 def test_where_a_calibration_explains_a_large_gap_the_calibrated_simulator_is_advised() -> None:
     world = {"world_file": "runs/far/diagnose/world/diagnosed.yaml"}
-    far = made.no_gap() | world | {"shrinkage": made.no_gap()["shrinkage"] | {"before": 51.0}}
+    far = made.no_gap() | world | {"shrinkage": made.no_gap()["shrinkage"] | {"before": 51.0, "after": 0.34}}
     (step, *_) = steps(far)
     assert step.why.startswith("Train in the calibrated simulator (") and "51 × the noise floor" in step.why
     assert "world=diagnosed" in step.command

@@ -110,9 +110,9 @@ class Candidate:
         """Return values of the free parameters, shape (..., p), as a reader is told them."""
         return values * [factor for factor, _ in self.say(robot)]
 
-    def on(self, scope: str) -> Candidate:
-        """Return the same on other joints."""
-        return replace(self, fixed={**self.fixed, "joints": scope.split(AND) if AND in scope else scope})
+    def on(self, joints: str | Sequence[str]) -> Candidate:
+        """Return the same on other joints: a word for some, or a list."""
+        return replace(self, fixed={**self.fixed, "joints": joints if isinstance(joints, str) else [*joints]})
 
     def with_start(self, value: float | None) -> Candidate:
         """Return the same with one more value of its only parameter in the grid."""

@@ -44,10 +44,19 @@ def shares(
     """Return what parameters of candidates, in their order, share with the calibration of a robot."""
     parameters = [(candidate, name) for candidate in candidates for name in candidate.free]
     return tuple(
-        Share(index, row, scopes[candidate.scope], torque_unit if row in TORQUES else 1.0)
+        Share(index, row, mask, torque_unit if row in TORQUES else 1.0)
         for index, (candidate, name) in enumerate(parameters)
-        if (row := ROWS.get((candidate.effect, name))) is not None and candidate.scope in scopes
+        if (row := ROWS.get((candidate.effect, name))) is not None
+        and (mask := _mask(candidate.fixed.get("joints"), scopes)) is not None
     )
+
+
+def _mask(joints: str | Sequence[str] | None, scopes: Mapping[str, np.ndarray]) -> np.ndarray | None:
+    """Return where an effect acts, a scope or a list of them, shape (n_joints,); None if that is no scope."""
+    names = [joints] if isinstance(joints, str) else [*(joints or ())]
+    if not names or any(name not in scopes for name in names):
+        return None
+    return np.any([scopes[name] for name in names], axis=0)
 
 
 def hand_over(

@@ -103,21 +103,17 @@ class Problem:
         most = self.glances or (count // 2 if count > self.settings.few else count)
         return replace(self.train, pieces=self.train.pieces.take(spread(np.arange(count), most)))
 
-    def with_scope(self, scope: str, joints: np.ndarray) -> Problem:
-        """Return the problem with one more scope, of joints of shape (n_channels,)."""
-        return self._part(scopes={**self.scopes, scope: joints})
-
     def only(self, effects: Sequence[str]) -> Problem:
         """Return the problem with a part of the library."""
-        return self._part(library=tuple(part for part in self.library if part.effect in effects))
+        return self._part([part for part in self.library if part.effect in effects])
 
     def without(self, effects: Sequence[str] | Mapping[str, Any]) -> Problem:
         """Return the problem without a part of the library."""
-        return self._part(library=tuple(part for part in self.library if part.effect not in effects))
+        return self._part([part for part in self.library if part.effect not in effects])
 
-    def _part(self, **other: Any) -> Problem:
-        """Return the problem with another library or scopes and the same memory: `replace` alone forgets."""
-        part = replace(self, **other)
+    def _part(self, library: Sequence[Candidate]) -> Problem:
+        """Return the problem with another library and the same memory: `replace` alone forgets."""
+        part = replace(self, library=tuple(library))
         object.__setattr__(part, "memory", self.memory)
         return part
 

@@ -13,6 +13,8 @@ from gsl.diagnosis.log.repeats import Repeat, align_repeats
 from gsl.diagnosis.settings import FloorSettings
 
 STILL = 1e-5  # [rad]: what commands move by beside a parabola, when they are one
+SAME = 1e-6  # by which positions of one step of an encoder may differ [rad]: rounding in a file
+FEW_VALUES = 0.25  # values a row, below which positions lie on a grid
 BLOCK = 5  # ticks of the low pass that joints that shake are seen through: 0.1 s at 50 Hz
 
 
@@ -71,11 +73,13 @@ def noise_floor(
         settings: How.
     """
     how = settings or FloorSettings()
-    least = np.array(max(resolution / np.sqrt(12.0), 1e-5)) if least is None else least
+    grid = find_grid(records)
+    rounded = np.maximum(np.maximum(resolution, grid) / np.sqrt(12.0), 1e-5)
+    least, air = (rounded, True) if least is None else (least, False)
     groups = [group for group in _group(records, repeats, held, how) if len(group) > 1]
     white = np.maximum(white_level(records, how), least)
     restless = wavers = np.zeros(len(white), dtype=bool)
-    if not least.ndim:  # in the air: steps shake a walking robot
+    if air:  # on the ground steps shake a robot
         wavers = _measure_wavering(records, white, period, how) > np.maximum(how.unsteadily * white, resolution)
         restless = _find_restless(records, white, np.maximum(how.unwhite * white, resolution), how)
     if groups:
@@ -84,8 +88,9 @@ def noise_floor(
         pairs = sum(len(group) - 1 for group in groups)
         samples = sum(part.shape[1] * (len(part) - 1) for part in spread) * len(square)
         sd = np.maximum(np.sqrt(square), least)
-        usual = np.inf if least.ndim else float(np.median(sd))
-        unsteady = (sd > how.unsteady * usual) & (sd > how.unsteadily * white)  # white noise is that of its own encoder
+        usual = float(np.median(sd)) if air else np.inf
+        own = np.maximum(how.unsteadily * white, grid)  # noise of an encoder of its own
+        unsteady = (sd > how.unsteady * usual) & (sd > own)
         restless |= wavers & (sd > how.unsteadily * white)  # what repeats as well shakes by no chance
         sd = np.where(unsteady, usual, sd)
         return NoiseFloor(sd, np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples, white, restless)
@@ -94,6 +99,19 @@ def noise_floor(
     sd = np.maximum(np.where(restless, np.minimum(rough, white), rough), least)
     calm = np.zeros(len(sd), dtype=bool)
     return NoiseFloor(sd, np.zeros(len(sd)), calm, "estimated", 0, resolution, how.estimate, white, restless)
+
+
+def find_grid(records: Sequence[Record]) -> np.ndarray:
+    """Return the step of each joint's encoder as its positions show it [rad], 0 where they show none, (n_joints,)."""
+    columns = np.vstack([record.measured for record in records]).T
+    return np.array([_find_step(column) for column in columns])
+
+
+def _find_step(values: np.ndarray) -> float:
+    steps = np.diff(np.unique(values))
+    steps = steps[steps > SAME]
+    few = len(steps) < FEW_VALUES * len(values)
+    return float(steps.min()) if few and len(steps) else 0.0
 
 
 def _variance(spread: Sequence[np.ndarray]) -> np.ndarray:

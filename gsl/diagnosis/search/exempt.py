@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from gsl.diagnosis.hypothesis.candidates import AND
 from gsl.diagnosis.hypothesis.common_mode import FACTORS, Share, shares
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.hypothesis.problem import Problem
@@ -23,14 +22,12 @@ class Exemption(NamedTuple):
 
     Attributes:
         place: Of the cause in the hypothesis.
-        scope: Of the joints that are left.
-        joints: These, shape (n_joints,).
+        joints: That are left: their scope, or a list.
         shifts: That leave all joints as they are, shape (7, n_joints).
     """
 
     place: int
-    scope: str
-    joints: np.ndarray
+    joints: str | Sequence[str]
     shifts: np.ndarray
 
 
@@ -38,14 +35,17 @@ def list_exemptions(problem: Problem, hypothesis: Hypothesis) -> Iterator[Exempt
     """Yield the causes of a hypothesis whose work the calibration undoes in some joints, zeros aside: see `zeros`."""
     robot, size = problem.simulator.plant.robot, problem.simulator.spread * SPREADS
     for place, (candidate, values) in enumerate(hypothesis.pairs):
-        for share in shares([candidate], problem.scopes, robot.torque_unit) if candidate.effect not in SHIFTS else ():
-            work, shift = _work(share, values, candidate.neutral), hypothesis.fit.shifts[share.row]
-            undone = share.joints & (-np.sign(work) * shift > UNDONE * abs(work))
+        own = shares([candidate], problem.scopes, robot.torque_unit) if candidate.effect not in SHIFTS else ()
+        works = [_work(share, values, candidate.neutral) for share in own]
+        for share, work in zip(own, works, strict=True):
+            undone = share.joints & (-np.sign(work) * hypothesis.fit.shifts[share.row] > UNDONE * abs(work))
             left = share.joints & ~undone
             if abs(work) > size[share.row] and undone.any() and left.sum() >= FEWEST:
                 shifts = hypothesis.fit.shifts.copy()
-                shifts[share.row, undone] += work
-                yield Exemption(place, AND.join(np.array(robot.controlled)[left]), left, shifts)
+                for each, does in zip(own, works, strict=True):
+                    shifts[each.row, undone] += does
+                names = [name for name, mask in problem.scopes.items() if np.array_equal(mask, left)]
+                yield Exemption(place, names[0] if names else list(np.array(robot.controlled)[left]), shifts)
 
 
 def _work(share: Share, values: np.ndarray, neutral: np.ndarray) -> float:

@@ -44,7 +44,10 @@ class Search:
         if self.nothing_left():
             return Selection(chosen, chosen, (chosen,), screen(self.problem, chosen), least)
         singles, screening = extend(self.problem, self.none, self._how.leads)
-        self.none = chosen = self.problem.relax(self.none, singles)
+        if (relaxed := self.problem.relax(self.none, singles)) is not self.none:
+            self.none = chosen = relaxed
+            least = max(self.thresholds.gain, self.thresholds.share * relaxed.cost)
+            singles, screening = extend(self.problem, relaxed, self._how.leads)
         if zeros_aside(self.problem, chosen):
             zeros = extend(self.problem.only(SHIFTS), chosen, self._how.leads)[0]
             seen = [single.places for single in singles]
@@ -131,7 +134,15 @@ class Search:
         """Whether a hypothesis stands against another one; zeros of many joints stand on grounds of their own."""
         if moves_zeros_alone(self.problem, hypothesis, other):
             return explains_zeros(self.problem, hypothesis, other)
-        return stands(hypothesis, other, least, flaw, self._how.freed)
+        return stands(hypothesis, other, least, flaw, self._least_to_free(other))
+
+    def _least_to_free(self, standing: Hypothesis) -> float:
+        """Return what a further effect has to free of the cost of shifts, whatever chance gains on residuals.
+
+        Where joints shake or a robot walks, shifts do the work of what no replay shows: there it is no ground.
+        """
+        left = max(0.0, standing.residual_cost - float(standing.counts.sum()))
+        return np.inf if self.thresholds.share else max(self._how.freed, self._how.least_share * left)
 
     def _bar(self, standing: Hypothesis) -> tuple[float, float]:
         """Return what a further effect has to gain over what stands, and what a flaw of the model may gain."""
@@ -142,7 +153,9 @@ class Search:
     def _lacking(self, standing: Hypothesis, level: float) -> bool:
         """Whether more is left than noise, or hidden in shifts; the cost of joints that shake does not show it."""
         few = float(standing.levels.max()) > self._how.room_of_one  # which a mean over all joints does not show
-        hides = self._most_to_free(standing) > self._how.hidden * min(self._bar(standing)[0], self._how.freed)
+        hides = self._most_to_free(standing) > self._how.hidden * min(
+            self._bar(standing)[0], self._least_to_free(standing)
+        )
         return standing.level > level or few or hides or bool(self.problem.train.comparison.shaking.any())
 
     def _most_to_free(self, standing: Hypothesis) -> float:
@@ -178,12 +191,12 @@ class Search:
 
     def exempt(self, chosen: Hypothesis) -> Hypothesis:
         """Take joints out of causes of many joints, where the calibration undoes what these do."""
-        for place, scope, joints, shifts in list_exemptions(self.problem, chosen):
-            self.problem = self.problem.with_scope(scope, joints)
-            candidates = tuple(part.on(scope) if k == place else part for k, part in enumerate(chosen.candidates))
+        least = max(self._how.gain, self.thresholds.share * chosen.cost)  # it is no effect more
+        for place, joints, shifts in list_exemptions(self.problem, chosen):
+            candidates = tuple(part.on(joints) if k == place else part for k, part in enumerate(chosen.candidates))
             fewer = self.problem.fit(candidates, chosen.start, shifts, every=1)
             self.tried.append(fewer)
-            if stands(fewer, chosen, self._how.gain, self._bar(chosen)[1]):  # it is no effect more
+            if stands(fewer, chosen, least, self._bar(chosen)[1]):
                 return fewer
         return chosen
 
@@ -191,8 +204,7 @@ class Search:
         """Give causes of all joints to the groups apart, where the calibration makes up for what these differ by."""
         problem, scopes = self.problem, self.problem.scopes
         size, count = problem.simulator.spread * SPREADS, problem.train.joints
-        robot = problem.simulator.plant.robot
-        groups = {name: mask for name, mask in scopes.items() if name in robot.groups and 1 < mask.sum() < count}
+        groups = {name: mask for name, mask in scopes.items() if 1 < mask.sum() < count}
         if not groups or not np.all(np.sum(list(groups.values()), axis=0) == 1):
             return chosen
         for k, candidate in enumerate(chosen.candidates):

@@ -93,14 +93,14 @@ def _log(findings: Findings, shrunk: Mapping[str, Any]) -> Iterator[str]:
         yield f"Differences of {1e3 * tolerance:.0f} mrad count as noise (tolerance): smaller causes cannot show."
     elif findings.verdict.word == "unknown" and findings.verdict.remaining > findings.options.verdict.rough:
         yield _ask_for_a_floor(findings)
-    elif findings.verdict.word == "unknown" and (shrunk["nearest_fraction"] or 0.0) >= NEARLY:
-        yield _ask_what_matters(shrunk)
     elif findings.verdict.hollow:
         named = ", ".join(dict.fromkeys(findings.selection.chosen.names)).replace("_", " ")
         yield (
             f"The log is so rough that even the plain simulator is within its noise. {named.capitalize()} fits better, "
             "but nothing says that it has to: record a motion twice, which measures the noise."
         )
+    elif findings.verdict.word == "unknown" and shrunk["nearest_left"] and shrunk["nearest_fraction"] >= NEARLY:
+        yield _ask_what_matters(findings, shrunk)
 
 
 def _ask_for_a_floor(findings: Findings) -> str:
@@ -114,12 +114,13 @@ def _ask_for_a_floor(findings: Findings) -> str:
     )
 
 
-def _ask_what_matters(shrunk: Mapping[str, Any]) -> str:
+def _ask_what_matters(findings: Findings, shrunk: Mapping[str, Any]) -> str:
     """Propose a little more than the nearest effects leave as what does not matter, rounded up to one digit."""
+    nearest = "the nearest effects and a calibration" if findings.selection.chosen.candidates else "a calibration"
     left, gone = shrunk["nearest_left"], 100.0 * shrunk["nearest_fraction"]
     digit = 10.0 ** math.floor(math.log10(AMPLE * left))
     return (
-        f"With the nearest effects and a calibration {min(gone, 99.9):.3g} % of the gap is gone. What is left, "
+        f"With {nearest} {min(gone, 99.9):.3g} % of the gap is gone. What is left, "
         f"{1e3 * left:.2g} mrad, is beyond the noise. If it does not matter, diagnose again with "
         f"tolerance={math.ceil(AMPLE * left / digit) * digit:.1g} [rad]."
     )

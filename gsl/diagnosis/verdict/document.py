@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.core.body import Robot
 from gsl.core.slides import levers
-from gsl.diagnosis.hypothesis.candidates import Candidate
+from gsl.diagnosis.hypothesis.candidates import AND, Candidate
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, share_of_excess
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.settings import VerdictSettings
@@ -96,7 +96,7 @@ def summary(
     """
     if verdict.word in WORDS and not causes:
         return WORDS[verdict.word]
-    *most, last = [f"{cause['effect'].replace('_', ' ')}{_of(cause['scope'])}" for cause in causes]
+    *most, last = [f"{cause['effect'].replace('_', ' ')}{_of(cause)}" for cause in causes]
     named = f"{', '.join(most)} and {last}" if most else last
     if verdict.word == "inseparable":
         groups = "; ".join(" or ".join(group) for group in verdict.inseparable).replace("_", " ")
@@ -118,8 +118,10 @@ def doubt(causes: Sequence[Mapping[str, Any]], how: VerdictSettings | None = Non
     return "" if least >= how.sure else "probably" if least >= how.even else "possibly"
 
 
-def _of(scope: str) -> str:
-    return "" if not scope else f" of {'all joints' if scope == 'all' else scope}"
+def _of(cause: Mapping[str, Any]) -> str:
+    scope, exempt = cause["scope"], cause.get("exempt")
+    where = f"all joints but {', '.join(exempt)}" if exempt else "all joints" if scope == "all" else scope
+    return f" of {where}" if where else ""
 
 
 def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
@@ -132,6 +134,7 @@ def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
         "kind": effect_class(candidate.effect).kind,
         "joints": candidate.joints(findings.log.robot),
         "scope": candidate.scope,
+        "exempt": _exempt(findings.log.robot, candidate),
         "fixed": {key: value for key, value in candidate.fixed.items() if key != "joints"},
         "parameters": _parameters(findings.log.robot, candidate, values, interval),
         "probability": cause.probability,
@@ -139,6 +142,13 @@ def _cause(findings: Findings, cause: Cause) -> dict[str, Any]:
         "meaning": (effect_class(candidate.effect).__doc__ or "").strip().splitlines()[0],
         "confused": None if sure else describe_confusion(candidate.effect),
     }
+
+
+def _exempt(robot: Robot, candidate: Candidate) -> list[str]:
+    """Return the joints that a list of joints leaves out, where these are fewer than it has."""
+    inside = candidate.joints(robot)
+    left = [joint for joint in robot.controlled if joint not in inside]
+    return left if AND in candidate.scope and 0 < len(left) < len(inside) else []
 
 
 def _parameters(robot: Robot, candidate: Candidate, values: np.ndarray, interval: np.ndarray) -> dict[str, Any]:

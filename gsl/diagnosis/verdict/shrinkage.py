@@ -25,8 +25,8 @@ FEW = 50  # residuals of a regime, of which fewer say nothing
 def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
     """Return the gap before and after, in floors, and the share of the excess that is gone, on held-out windows.
 
-    "nearest" is the best hypothesis, be it named or not: the share that goes with it, and what it leaves of the joint
-    that is furthest off [rad].
+    "nearest" is the best hypothesis, be it named or not: the share that goes with it, and what it leaves [rad]. That is
+    of the joint that is furthest off, of those that do not shake.
 
     Args:
         findings: The diagnosis.
@@ -43,6 +43,7 @@ def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict
     if chosen is not findings.answer:
         nearest = log.residual(findings.simulator.simulate(chosen.effects, chosen.fit.shifts, log.pieces))
     left = np.sqrt(_mean_square(nearest[log.held_out], log.used)) * log.comparison.floor
+    calm = ~log.comparison.shaking[: len(log.joints)]
     return {
         "floor": 1.0,
         **{key: float(np.sqrt(value.mean())) for key, value in mean.items()},
@@ -51,7 +52,7 @@ def shrinkage(findings: Findings, before: np.ndarray, after: np.ndarray) -> dict
         "low": low,
         "high": high,
         "nearest_fraction": compute_removed(log, z["before"], nearest)[0],
-        "nearest_left": float(left.max()),
+        "nearest_left": float(left[: len(log.joints)][calm].max(initial=0.0)),
         "ceiling_fraction": ceiling(log, before, findings.laws),
         "by_joint": [
             {"joint": joint, "before": float(np.sqrt(mean["before"][k])), "after": float(np.sqrt(mean["after"][k]))}
