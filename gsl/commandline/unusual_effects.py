@@ -16,14 +16,14 @@ FAR = 3.0  # widths of a documented range; no value of a world that comes with g
 def list_unusual(effects: Mapping[str, Any], robot: Robot) -> Iterator[str]:
     """Yield a line on each value that lies far from its documented range, of joints that slide in metres."""
     for effect in build(effects):
-        name, joints = name_of(effect), getattr(effect, "joints", ())
-        slides = [joint for joint in robot.list_joints(joints) if joint in robot.slides] if joints else []
-        alone = slides if slides and len(slides) == len(robot.list_joints(joints)) else []
+        name, where = name_of(effect), getattr(effect, "joints", ())
+        joints = [robot.joint(joint) for joint in robot.list_joints(where)] if where else []
+        sizes = [joint.size for joint in joints] if all(joint.slides for joint in joints) else []
         for key, about in narrow_settings(type(effect), robot.ranges.get(name, {})).items():
             value = getattr(effect, key)
             if about.lower is None or about.upper is None or not isinstance(value, int | float):
                 continue
-            lower, upper, unit = _in_metres(about, [robot.joint(joint).size for joint in alone])
+            lower, upper, unit = _in_metres(about, sizes)
             if max(lower - value, value - upper) > FAR * (upper - lower):
                 usual = f"{lower:g} to {upper:g} {unit}".rstrip()
                 yield f"effects.{name}.{key} = {value:g}: far from its documented range, {usual}"

@@ -112,7 +112,7 @@ class Collect:
     def _write_page(self, folder: Path, batch: Batch, own: int) -> None:
         walk = read_footfalls("the first episode", batch.episodes[0])
         unit, noisy = Unit.of(self.task), bool(self.action_noise)
-        write_collection_page(folder, batch, own, unit, noisy=noisy, walk=walk, slides=list_slides(self.world))
+        write_collection_page(folder, batch, own, unit, noisy=noisy, walk=walk, slides=batch.metadata.get("slides", ()))
 
     def _play(self, scenario: Scenario, pieces: Sequence[Piece], console: Console) -> list[Trajectory]:
         """Return the episodes, of a robot somewhere else from its answer."""

@@ -83,6 +83,6 @@ def test_where_little_is_left_it_is_asked_whether_that_matters() -> None:
     (caveat,) = [line for line in caveats(unsure, (), left, []) if "beyond the noise" in line]
     assert caveat.startswith("With a calibration 99.9 % of the gap is gone.")
     assert "0.86 mrad" in caveat and caveat.endswith("diagnose again with tolerance=0.002 [rad].")
-    far = caveats(unsure, (), left | {"nearest_fraction": 0.8}, [])
+    far = [line for share in (0.8, None) for line in caveats(unsure, (), left | {"nearest_fraction": share}, [])]
     hollow = caveats(replace(unsure, verdict=replace(unsure.verdict, hollow=True)), (), left, [])
     assert not any("beyond the noise" in line for line in [*far, *hollow])

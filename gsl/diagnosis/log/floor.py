@@ -73,9 +73,10 @@ def noise_floor(
         settings: How.
     """
     how = settings or FloorSettings()
-    grid = find_grid(records)
-    rounded = np.maximum(np.maximum(resolution, grid) / np.sqrt(12.0), 1e-5)
-    least, air = (rounded, True) if least is None else (least, False)
+    air, grid = least is None, np.zeros(1)
+    if least is None:
+        grid = find_grid(records)
+        least = np.maximum(np.maximum(resolution, grid) / np.sqrt(12.0), 1e-5)
     groups = [group for group in _group(records, repeats, held, how) if len(group) > 1]
     white = np.maximum(white_level(records, how), least)
     restless = wavers = np.zeros(len(white), dtype=bool)

@@ -40,13 +40,13 @@ class Search:
 
     def select(self) -> Selection:
         """Return the hypothesis that stands in the end, and all that were tried."""
-        chosen, least = self.none, max(self.thresholds.gain, self.thresholds.share * self.none.cost)
+        chosen, least = self.none, self._least()
         if self.nothing_left():
             return Selection(chosen, chosen, (chosen,), screen(self.problem, chosen), least)
         singles, screening = extend(self.problem, self.none, self._how.leads)
         if (relaxed := self.problem.relax(self.none, singles)) is not self.none:
             self.none = chosen = relaxed
-            least = max(self.thresholds.gain, self.thresholds.share * relaxed.cost)
+            least = self._least()
             singles, screening = extend(self.problem, relaxed, self._how.leads)
         if zeros_aside(self.problem, chosen):
             zeros = extend(self.problem.only(SHIFTS), chosen, self._how.leads)[0]
@@ -104,6 +104,10 @@ class Search:
     @property
     def _how(self) -> SearchSettings:
         return self.problem.settings
+
+    def _least(self) -> float:
+        """Return what an effect has to gain over calibration alone."""
+        return max(self.thresholds.gain, self.thresholds.share * self.none.cost)
 
     def _fit(self, chosen: Hypothesis, kept: list[int]) -> Hypothesis:
         """Fit some of the effects of a hypothesis anew from where they are."""

@@ -99,7 +99,9 @@ def _log(findings: Findings, shrunk: Mapping[str, Any]) -> Iterator[str]:
             f"The log is so rough that even the plain simulator is within its noise. {named.capitalize()} fits better, "
             "but nothing says that it has to: record a motion twice, which measures the noise."
         )
-    elif findings.verdict.word == "unknown" and shrunk["nearest_left"] and shrunk["nearest_fraction"] >= NEARLY:
+    elif (
+        findings.verdict.word == "unknown" and shrunk["nearest_left"] and (shrunk["nearest_fraction"] or 0.0) >= NEARLY
+    ):
         yield _ask_what_matters(findings, shrunk)
 
 
