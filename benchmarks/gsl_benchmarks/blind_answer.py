@@ -17,7 +17,7 @@ from gsl.core.setting import component, setting
 from gsl.core.step_metrics import note_step
 from gsl.core.validation import make
 from gsl.diagnosis.log.files import check_log, on_ground
-from gsl.diagnosis.options import Options
+from gsl.diagnosis.options import Chance, Options
 from gsl.rollout.parallel import Workers, arriving
 from gsl.storage import documents
 from gsl.storage.hashing import file_hash
@@ -52,7 +52,7 @@ class _Task(NamedTuple):
 
     case: Path
     folder: Path
-    nulls: tuple[float, ...] | None
+    chances: tuple[Chance, ...]
 
 
 @component
@@ -106,7 +106,7 @@ class BlindAnswer:
     ) -> None:
         """Answer the cases that have no answer yet; those with a leader use what chance gained there."""
         missing = [case for case in sorted(cases) if not _file(folder, case).exists()]
-        tasks = [_Task(case, folder, _nulls(folder, leaders.get(case))) for case in missing]
+        tasks = [_Task(case, folder, _chances(folder, leaders.get(case))) for case in missing]
         options = Options(most=self.most, duels=self.duels, nulls=self.nulls, threads=1)
         shared = options, self.baselines, self.trust
         for index, (hashes, seconds) in arriving(_answer, shared, tasks, self.workers, progress):
@@ -148,8 +148,8 @@ def _leaders(cases: Sequence[Path]) -> dict[Path, Path]:
     return leaders
 
 
-def _nulls(folder: Path, leader: Path | None) -> tuple[float, ...] | None:
-    return None if leader is None else tuple(document(_file(folder, leader))["null_gains"])
+def _chances(folder: Path, leader: Path | None) -> tuple[Chance, ...]:
+    return () if leader is None else tuple(Chance(*done) for done in document(_file(folder, leader))["chances"])
 
 
 def _file(folder: Path, case: Path) -> Path:
@@ -172,7 +172,7 @@ def _answer(frozen: bytes, task: _Task) -> tuple[dict[str, str], dict[str, float
         documents.write_json(files[-1], answer)
         seconds[name] = took
     begin = time.perf_counter()
-    answer = answer_question(question, asked, known_nulls=task.nulls, tick=_quiet)
+    answer = answer_question(question, asked, chances=task.chances, tick=_quiet)
     seconds[OURS] = time.perf_counter() - begin
     files.append(_file(task.folder, task.case))
     documents.write_json(files[-1], answer)

@@ -26,7 +26,7 @@ from gsl.errors import ArtifactError, InputError
 from gsl.storage.manifest import check_files, read, resembles, strange_files
 
 USER = "gsl-user"
-ROBOT = "robot"  # setting of a world
+FILES = ("robot", "servo")  # settings of a world that may name a file
 _HYDRA = "hydra"
 _SELF = "_self_"
 _OWN_FOLDER = "or copy what you have changed into a folder of your own, which holds no manifest.json"
@@ -61,17 +61,17 @@ class BudgetedFiles(FileConfigSource):
                 raise InputError(f"{path}: names a class, as {TARGET}, and a mapping builds none; leave it out")
         result = super().load_config(config_path)
         if self.provider == USER:
-            _find_robots(result.config, Path(self.path))
+            _find_files(result.config, Path(self.path))
         return result
 
 
-def _find_robots(config: Any, folder: Path) -> None:
-    """Let `robot:` name a file as seen from the folder of --config-dir, wherever the command is typed."""
+def _find_files(config: Any, folder: Path) -> None:
+    """Let a world name its files as seen from the folder of --config-dir, wherever the command is typed."""
     for key in (key for key in config if isinstance(key, str)) if isinstance(config, DictConfig) else ():
         value = None if OmegaConf.is_missing(config, key) or OmegaConf.is_interpolation(config, key) else config[key]
-        if key == ROBOT and isinstance(value, str) and Path(value).suffix and (folder / value).is_file():
+        if key in FILES and isinstance(value, str) and Path(value).suffix and (folder / value).is_file():
             config[key] = os.path.relpath(folder / value)
-        _find_robots(value, folder)
+        _find_files(value, folder)
 
 
 def check_folder(config_dir: Path) -> None:

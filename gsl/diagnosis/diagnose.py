@@ -14,7 +14,7 @@ from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, name_in_place
 from gsl.diagnosis.hypothesis.problem import LATENCY, Problem
 from gsl.diagnosis.log.files import on_ground
 from gsl.diagnosis.log.log import Log, cut_log
-from gsl.diagnosis.options import Options
+from gsl.diagnosis.options import Chance, Options
 from gsl.diagnosis.search.looks import look
 from gsl.diagnosis.search.plausibility import find_idle, refute
 from gsl.diagnosis.search.reference import Nominal, calibrate_on, clock_shift
@@ -66,12 +66,12 @@ def diagnose(
         shift = clock_shift(log, nominal, options, tick)
         nominal = nominal._replace(plant=change(nominal.plant, {LATENCY: {"delay": shift}}))
     problem, none = _pose(log, nominal, options, tick)
-    null_gains = options.null_gains
-    if options.nulls and not null_gains and not log.walking:
+    chances = options.chances
+    if options.nulls and not chances and not log.walking:
         tick("self-test: what chance gains on these commands")
-        null_gains = tuple(simulate_nulls(log, problem, none, options))
+        chances = tuple(simulate_nulls(log, problem, none, options))
     tick("trying the library on the log")
-    selection, refuted = _search(log, problem, none, null_gains, options)
+    selection, refuted = _search(log, problem, none, chances, options)
     rivals, trials = _survivors(selection, options.verdict), []
     tick("what a law of any servo would explain")
     chosen = selection.chosen
@@ -83,7 +83,7 @@ def diagnose(
     verdict = _judge(log, rivals, trials, options).judge(selection, missing)
     lacking = verdict.word == "unknown" and missing > 1.0
     forms = find_forms(log, problem.simulator, options.verdict.law) if lacking else ()
-    tested = null_gains, tuple(trials)
+    tested = chances, tuple(trials)
     return Findings(log, problem, selection, verdict, *tested, baseline, shift, refuted, laws, forms, options)
 
 
@@ -119,12 +119,12 @@ def _pose(log: Log, nominal: Nominal, options: Options, tick: Callable[[str], No
 
 
 def _search(
-    log: Log, problem: Problem, none: Hypothesis, null_gains: Sequence[float], options: Options
+    log: Log, problem: Problem, none: Hypothesis, chances: Sequence[Chance], options: Options
 ) -> tuple[Selection, dict[str, str]]:
     """Search again without the effects that lose their claim to the name; return them with the reasons."""
     how = options.search
     share = how.walk_share if log.walking else how.shaking_share * log.shaking_share
-    thresholds = Thresholds(max(how.gain, how.chance * max(null_gains, default=0.0)), share)
+    thresholds = Thresholds.of(chances, how, share)
     width = 1 if log.walking else how.beam  # a replay in Bullet takes milliseconds
     refuted: dict[str, str] = {}
     while True:
@@ -172,7 +172,6 @@ def _judge(log: Log, rivals: Sequence[Hypothesis], trials: Sequence[Trial], opti
         log.noise.source != "repeats" and not options.tolerance,
         how,
         noise_cost,
-        options.search.freed,
     )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator
 
@@ -37,6 +37,18 @@ Nulls = Annotated[int, setting("simulated logs without an effect in the self-tes
 Tolerance = Annotated[float, setting("difference of a joint that does not matter, beside the noise", unit="rad", ge=0)]
 
 
+class Chance(NamedTuple):
+    """What the best effects gain over calibration alone in a simulated log that has none.
+
+    Attributes:
+        gain: In all.
+        freed: By freeing the cost of shifts.
+    """
+
+    gain: float
+    freed: float
+
+
 @dataclass(frozen=True)
 class Options:
     """How a diagnosis works.
@@ -52,7 +64,7 @@ class Options:
         seed: Of the simulated logs.
         tolerance: Difference of a joint that does not matter, beside the noise [rad]: the model's roughness.
         held_out: Labels of the trajectories that are for checking; empty for every second motion.
-        null_gains: What chance gains on these commands in this world, if it was measured already.
+        chances: What chance gains on these commands in this world, if it was measured already.
         search, plausibility, verdict, design: The numbers that decide.
     """
 
@@ -66,7 +78,7 @@ class Options:
     seed: int = 0
     tolerance: float = 0.0
     held_out: Mapping[str, Any] = field(default_factory=dict)
-    null_gains: tuple[float, ...] = ()
+    chances: tuple[Chance, ...] = ()
     search: SearchSettings = field(default_factory=SearchSettings)
     plausibility: PlausibilitySettings = field(default_factory=PlausibilitySettings)
     verdict: VerdictSettings = field(default_factory=VerdictSettings)

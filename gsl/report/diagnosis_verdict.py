@@ -24,6 +24,7 @@ from gsl.report.diagnosis_words import (
 
 GROUPS = 3  # that the headline names
 NEARER = 0.5  # share of the gap, below which a calibration has to take it to be advised
+NEARLY = 0.95  # share of the gap that the nearest effects explain, from which on only a rest has no name
 CLEAR = 2.0  # noise floors from which on a calibration is no detail
 VERDICTS = ("no_gap", "causes", "inseparable", "unknown", "wiring")
 
@@ -87,7 +88,8 @@ def list_open_groups(document: Document) -> list[str]:
 def _unknown(document: Document) -> str:
     if document.get("verdict") != "unknown":
         return "No verdict"
-    return "There is a gap, and no effect that we know explains it"
+    gone = finite(part(document, "shrinkage").get("nearest_fraction")) or 0.0
+    return f"There is a gap, and no effect that we know explains {'all of it' if gone >= NEARLY else 'it'}"
 
 
 def cause_name(cause: Document) -> str:

@@ -29,7 +29,6 @@ from gsl.robots.catalogue import see_from as see_robot_from
 from gsl.rollout.parallel import Workers, threads
 from gsl.storage import documents
 from gsl.storage.models import write_model
-from gsl.storage.workplace import destination
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
 from gsl.training.servo_verdict import problems, remarks
 from gsl.training.servo_walks import Walks, walks
@@ -135,14 +134,8 @@ class TrainServo:
         return np.array([widths[name] for name in model.groups])[group]
 
     def _write_world(self, folder: Path, learned: LearnedServo) -> None:
-        place = destination(folder) / FILE
-        text = yaml.safe_dump(
-            documents.plain(
-                describe(self.sim) | {"robot": see_robot_from(self.sim.robot, folder), "servo": place.as_posix()}
-            ),
-            sort_keys=False,
-            allow_unicode=True,
-        )
+        own = {"robot": see_robot_from(self.sim.robot, folder), "servo": FILE}  # this folder is its --config-dir
+        text = yaml.safe_dump(documents.plain(describe(self.sim) | own), sort_keys=False, allow_unicode=True)
         gap = f"held out, {learned.before['all']:.2f} noise floors became {learned.after['all']:.2f}"
         (folder / WORLD).parent.mkdir()
         (folder / WORLD).write_text(f"# The simulator with a learned servo: {gap}.\n{text}", encoding="utf-8")

@@ -13,7 +13,7 @@ from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.common_mode import hand_over, shares
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import cut_log
-from gsl.diagnosis.options import Options
+from gsl.diagnosis.options import Chance, Options
 from gsl.diagnosis.search.plausibility import find_idle
 from gsl.diagnosis.search.reference import Nominal
 from gsl.diagnosis.search.screening import extend
@@ -117,8 +117,17 @@ def test_what_frees_the_shifts_stands_whatever_chance_gains_on_residuals() -> No
 
 def test_where_joints_shake_what_frees_the_shifts_stands_as_anything_else() -> None:
     knee = problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
-    search = Search(knee, knee.fit_calibration(), Thresholds(gain=1e4, share=1e-9))
+    chances = [Chance(1e4, 0.0)]
+    search = Search(knee, knee.fit_calibration(), Thresholds.of(chances, knee.settings, 1e-9))
     assert not search.select().chosen.candidates
+
+
+@pytest.mark.parametrize(("freed", "causes"), [(20.0, 1), (1e4, 0)])
+def test_what_chance_frees_of_the_shifts_stands_for_nothing(freed: float, causes: int) -> None:
+    knee = problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
+    thresholds = Thresholds.of([Chance(1e4, freed), Chance(5e3, 0.0)], knee.settings, 0.0)
+    chosen = Search(knee, knee.fit_calibration(), thresholds).select().chosen
+    assert len(chosen.candidates) == causes
 
 
 def test_calibration_alone_is_fitted_again_from_where_a_larger_hypothesis_ends(dry: Problem) -> None:

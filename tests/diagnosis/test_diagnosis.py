@@ -33,7 +33,7 @@ WIDE = {"servo_gain": {"kp": (0.004, 1.5), "kd": (0.03, 1.5)}}
 
 def test_no_effect_is_no_gap_and_the_self_test_knows_what_chance_gains() -> None:
     result = found({}, seed=2, nulls=1)
-    assert result.verdict.word == "no_gap" and len(result.null_gains) == 1
+    assert result.verdict.word == "no_gap" and len(result.chances) == 1
 
 
 CAUSES = {

@@ -125,6 +125,14 @@ def test_every_verdict_is_told(kind: str, phrases: tuple[str, ...]) -> None:
     assert [entry for entry in phrases if entry not in text] == []
 
 
+@pytest.mark.parametrize(
+    ("gone", "phrase"), [(0.99, "explains all of it"), (0.6, "explains it"), (None, "explains it")]
+)
+def test_a_gap_that_is_nearly_explained_is_said_to_be_so(gone: float | None, phrase: str) -> None:
+    document = {"verdict": "unknown", "shrinkage": {"nearest_fraction": gone}}
+    assert headline(document) == f"There is a gap, and no effect that we know {phrase}"
+
+
 def test_where_a_calibration_explains_a_large_gap_the_calibrated_simulator_is_advised() -> None:
     world = {"world_file": "runs/far/diagnose/world/diagnosed.yaml"}
     far = made.no_gap() | world | {"shrinkage": made.no_gap()["shrinkage"] | {"before": 51.0, "after": 0.34}}

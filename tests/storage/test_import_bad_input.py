@@ -316,7 +316,11 @@ SETTINGS = {
         {"signals": {"action": {"column": []}, "position": "q"}},
         "mapping.signals.action.column: names no column",
     ),
-    "no positions": ({"signals": {"action": "a"}}, "mapping.signals.position: has no value"),
+    "no positions": ({"signals": {"action": "a"}}, "mapping.signals.position: has no value; say in which column"),
+    "positions misspelt": (
+        {"signals": {"action": "a", "postion": "p"}},
+        "mapping.signals.position: has no value; is it postion?",
+    ),
     "a sign": (
         {"signals": {"action": "goal_{joint}", "position": {"column": "q_{joint}", "sign": 2}}},
         "mapping.signals.position.sign = 2.0: must be 1 or -1",

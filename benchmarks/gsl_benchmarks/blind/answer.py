@@ -14,7 +14,7 @@ from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.log.log import cut_log
-from gsl.diagnosis.options import Options
+from gsl.diagnosis.options import Chance, Options
 from gsl.diagnosis.search.reference import Nominal, calibrate_on
 from gsl.diagnosis.verdict.document import document
 from gsl_benchmarks.blind.baselines import BASELINES
@@ -47,12 +47,12 @@ class Question:
 
 
 def answer_question(
-    question: Question, options: Options, *, known_nulls: Sequence[float] | None, tick: Callable[[str], None]
+    question: Question, options: Options, *, chances: Sequence[Chance], tick: Callable[[str], None]
 ) -> dict[str, Any]:
     """Return the document of a diagnosis with the gains of chance that it measured."""
-    options = replace(options, null_gains=tuple(known_nulls or ()))
+    options = replace(options, chances=tuple(chances))
     findings = diagnose(question.log, question.plant, question.step, options, tick, reference=question.reference)
-    report = document(findings, null_gains=list(findings.null_gains))
+    report = document(findings, chances=[list(chance) for chance in findings.chances])
     return {key: value for key, value in report.items() if key not in BULKY}
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from gsl.diagnosis.hypothesis.hypothesis import Gain, Hypothesis, gain
+from gsl.diagnosis.options import Chance
 from gsl.diagnosis.search.screening import Screening
 from gsl.diagnosis.settings import SearchSettings
 
@@ -17,11 +19,20 @@ class Thresholds:
 
     Attributes:
         gain: Of an effect over what stands without it.
+        freed: Of the cost of shifts, that an effect may free instead.
         share: Of the cost of what stands, that any effect has to explain; noise holds no such share, and is let be.
     """
 
     gain: float = SearchSettings.gain
+    freed: float = SearchSettings.freed
     share: float = 0.0
+
+    @classmethod
+    def of(cls, chances: Sequence[Chance], how: SearchSettings, share: float) -> Thresholds:
+        """Return what has to be gained where chance gains so much; by freeing shifts nothing is, where costs vary."""
+        gain = how.chance * max((chance.gain for chance in chances), default=0.0)
+        freed = how.chance * max((chance.freed for chance in chances), default=0.0)
+        return cls(max(how.gain, gain), np.inf if share else max(how.freed, freed), share)
 
 
 @dataclass(frozen=True)
@@ -34,6 +45,7 @@ class Selection:
         tried: All hypotheses, best first, `none` among them.
         screening: The first one; a diagnosis asks once more what is invisible, on top of the chosen hypothesis.
         least: What an effect has to gain in cost here, to be more than chance.
+        freed: What it has to free of the cost of shifts instead.
         rejected: Single effects that cost less than the first that stands, and do not stand themselves.
     """
 
@@ -42,6 +54,7 @@ class Selection:
     tried: tuple[Hypothesis, ...]
     screening: Screening
     least: float = 0.0
+    freed: float = SearchSettings.freed
     rejected: tuple[Hypothesis, ...] = ()
 
     @property

@@ -42,7 +42,7 @@ class Search:
         """Return the hypothesis that stands in the end, and all that were tried."""
         chosen, least = self.none, self._least()
         if self.nothing_left():
-            return Selection(chosen, chosen, (chosen,), screen(self.problem, chosen), least)
+            return Selection(chosen, chosen, (chosen,), screen(self.problem, chosen), least, self.thresholds.freed)
         singles, screening = extend(self.problem, self.none, self._how.leads)
         if (relaxed := self.problem.relax(self.none, singles)) is not self.none:
             self.none = chosen = relaxed
@@ -61,7 +61,8 @@ class Search:
                 chosen = self._challenge(chosen)
             else:
                 self._rival(chosen)
-        return Selection(self.none, chosen, tuple(sorted(self.tried, key=by_cost)), screening, least, tuple(rejected))
+        tried, freed = tuple(sorted(self.tried, key=by_cost)), self.thresholds.freed
+        return Selection(self.none, chosen, tried, screening, least, freed, tuple(rejected))
 
     def nothing_left(self) -> bool:
         """Whether calibration alone leaves no more than noise, in every joint, and hides nothing."""
@@ -141,12 +142,9 @@ class Search:
         return stands(hypothesis, other, least, flaw, self._least_to_free(other))
 
     def _least_to_free(self, standing: Hypothesis) -> float:
-        """Return what a further effect has to free of the cost of shifts, whatever chance gains on residuals.
-
-        Where joints shake or a robot walks, shifts do the work of what no replay shows: there it is no ground.
-        """
+        """Return what a further effect has to free of the cost of shifts, whatever chance gains on residuals."""
         left = max(0.0, standing.residual_cost - float(standing.counts.sum()))
-        return np.inf if self.thresholds.share else max(self._how.freed, self._how.least_share * left)
+        return max(self.thresholds.freed, self._how.least_share * left)
 
     def _bar(self, standing: Hypothesis) -> tuple[float, float]:
         """Return what a further effect has to gain over what stands, and what a flaw of the model may gain."""

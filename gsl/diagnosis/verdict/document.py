@@ -253,12 +253,15 @@ def _replays(findings: Findings, before: np.ndarray, after: np.ndarray) -> list[
 
 
 def _self_test(findings: Findings) -> dict[str, Any] | None:
-    if not findings.null_gains and not findings.trials:
+    if not findings.chances and not findings.trials:
         return None
     counts: dict[tuple[str, str], int] = {}
     for trial in findings.trials:
         key = (" + ".join(trial.truth) or "no effect", " + ".join(trial.answer) or "no effect")
         counts[key] = counts.get(key, 0) + 1
     confusions = [{"truth": truth, "answer": answer, "count": count} for (truth, answer), count in counts.items()]
-    cases = len(findings.null_gains) + len(findings.trials)
-    return {"cases": cases, "null_gain": max(findings.null_gains, default=None), "confusions": confusions}
+    cases, gain = (
+        len(findings.chances) + len(findings.trials),
+        max((done.gain for done in findings.chances), default=None),
+    )
+    return {"cases": cases, "null_gain": gain, "confusions": confusions}

@@ -15,7 +15,7 @@ from gsl.diagnosis.angles import effects_in_metres
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import Log
-from gsl.diagnosis.options import Options
+from gsl.diagnosis.options import Chance, Options
 from gsl.diagnosis.search.reference import Baseline
 from gsl.diagnosis.search.selection import Selection
 from gsl.diagnosis.simulate.calibration import HALF_STEP, calibrate, to_effects
@@ -40,7 +40,7 @@ class Findings:
         problem: Where hypotheses competed.
         selection: What came of it.
         verdict: What can be said.
-        null_gains: What chance gained in simulated logs.
+        chances: What chance gained in simulated logs.
         trials: Duels of the surviving causes in simulated logs.
         baseline: From the reference, if there is one.
         shift: Between the clocks of commands and measurements, taken out first [s], if they are apart.
@@ -54,7 +54,7 @@ class Findings:
     problem: Problem
     selection: Selection
     verdict: Verdict
-    null_gains: tuple[float, ...]
+    chances: tuple[Chance, ...]
     trials: tuple[Trial, ...]
     baseline: Baseline | None
     shift: float = 0.0

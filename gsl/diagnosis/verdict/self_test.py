@@ -17,7 +17,7 @@ from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost, name_in_pla
 from gsl.diagnosis.hypothesis.problem import Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
-from gsl.diagnosis.options import Options
+from gsl.diagnosis.options import Chance, Options
 from gsl.diagnosis.search.screening import extend
 from gsl.diagnosis.settings import VerdictSettings
 from gsl.diagnosis.simulate.calibration import draw_shifts, no_shifts
@@ -102,18 +102,21 @@ def repose(log: Log, problem: Problem, truth: Hypothesis, rng: np.random.Generat
     return replace(problem, train=train, held_out=held_out)
 
 
-def simulate_nulls(log: Log, problem: Problem, none: Hypothesis, options: Options) -> list[float]:
-    """Return the best gains over calibration in logs without an effect."""
-    gains = []
+def simulate_nulls(log: Log, problem: Problem, none: Hypothesis, options: Options) -> list[Chance]:
+    """Return what the best effects gain over calibration in logs without one."""
+    chances = []
     for trial in range(options.nulls):
         rng = np.random.default_rng((options.seed, trial, 1))
         fake = repose(log, problem, replace(none, candidates=(), parameters=()), rng)
         base = fake.fit_calibration()
         singles, _ = extend(fake, base, NULL_LEADS)
         base = fake.relax(base, singles)
-        gains.append(base.cost - singles[0].cost if singles else 0.0)
+        gains = [base.cost - single.cost for single in singles]
+        frees = [base.fit.prior_cost - single.fit.prior_cost for single in singles]
+        freed = max(map(min, zip(gains, frees, strict=True)), default=0.0)
+        chances.append(Chance(max(gains, default=0.0), freed))
         problem.tick("")
-    return gains
+    return chances
 
 
 def duel(log: Log, problem: Problem, rivals: Sequence[Hypothesis], options: Options) -> list[Trial]:

@@ -89,7 +89,6 @@ class Judge:
         guessed: Whether the noise floor is a guess: nothing was repeated, and nobody said what does not matter.
         settings: What counts.
         noise_cost: Of a residual that is nothing but noise.
-        freed: Of the cost of shifts, that a cause has to free to stand by that alone.
     """
 
     expected: float
@@ -101,7 +100,6 @@ class Judge:
     guessed: bool = False
     settings: VerdictSettings = field(default_factory=VerdictSettings)
     noise_cost: float = SearchSettings.noise_cost
-    freed: float = SearchSettings.freed
 
     def judge(self, selection: Selection, missing: float = 0.0) -> Verdict:
         """Return what a selection allows to say.
@@ -133,7 +131,9 @@ class Judge:
         sure = complete * (how.lone if self.lone else 1.0)
         scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
         freed = none.fit.prior_cost - chosen.fit.prior_cost  # what a calibration would have to be unusual for
-        hollow = self.guessed and none.level < how.beneath * self.expected and freed <= min(selection.least, self.freed)
+        hollow = (
+            self.guessed and none.level < how.beneath * self.expected and freed <= min(selection.least, selection.freed)
+        )
         word = "unknown" if hollow or complete < 0.5 else "inseparable" if groups else "causes"
         return Verdict(word, scaled, groups, explained, remaining, complete, how.whole, missing, hollow)
 

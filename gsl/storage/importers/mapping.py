@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import field
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import BeforeValidator
 
+from gsl.core.likeness import find_alike
 from gsl.core.other_commands import OTHER_COMMANDS
 from gsl.core.setting import component, setting
 from gsl.core.validation import did_you_mean, make
@@ -118,7 +119,7 @@ class Mapping:
             raise ConfigError("joints", "must be different names", given=", ".join(names) or "[]")
         for name in NEEDED:
             if name not in self.signals and not (name == "action" and set(OTHER_COMMANDS) & set(self.signals)):
-                raise ConfigError(f"signals.{name}", "has no value; say in which column it is")
+                raise ConfigError(f"signals.{name}", _lacking(name, self.signals))
         for pattern in self.files.values() if isinstance(self.files, dict) else filter(None, [self.files]):
             if not pattern or pattern.startswith("/") or ".." in pattern.split("/"):
                 raise ConfigError("files", "must be names or patterns of files below the source", given=pattern or "''")
@@ -185,6 +186,12 @@ def _check_unit(name: str, signal: Signal) -> None:
         except ValueError as error:
             problem = _of_other_kind(unit) if name in COMMANDS else ""
             raise ConfigError(f"{where}.unit{'.' * bool(joint)}{joint}", problem or str(error), given=unit) from error
+
+
+def _lacking(name: str, signals: Iterable[str]) -> str:
+    """Return what to say of a signal that is missing: which other one may be meant."""
+    near = find_alike(name, [other for other in signals if other not in KNOWN])
+    return f"has no value; is it {near[0]}?" if near else "has no value; say in which column it is"
 
 
 def _of_other_kind(unit: str) -> str:
