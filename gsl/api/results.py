@@ -12,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 from gsl.core.budget import DOCUMENT_BYTES, read_text
 from gsl.core.described import restore
 from gsl.core.interfaces import World
+from gsl.errors import ArtifactError
 from gsl.grounding.diagnosis_file import read_diagnosis
 from gsl.grounding.effects import switch_on
 from gsl.report.account import account
+from gsl.storage import manifest
 from gsl.storage.artifact import Artifact
 from gsl.storage.diagnosis_report import report_of
 from gsl.storage.hashing import PAGE
@@ -49,8 +51,12 @@ class Result:
 
     @property
     def metrics(self) -> Mapping[str, Any]:
-        """The figures that the stage reported."""
-        return self.artifact.metrics
+        """The figures that the stage reported.
+
+        Raises:
+            ArtifactError: Another artifact has taken its place (force=true).
+        """
+        return self._intact.metrics
 
     @property
     def page(self) -> Path | None:
@@ -63,8 +69,15 @@ class Result:
     def _repr_html_(self) -> str:
         return "".join(
             f"<p><b>{escape(part.title)}</b></p>{_table(part.columns, part.rows)}<p>{escape(part.caption or '')}</p>"
-            for part in account(self.artifact)
+            for part in account(self._intact)
         )
+
+    @property
+    def _intact(self) -> Artifact:
+        """The artifact, if no other one lies in its folder by now."""
+        if manifest.read(self.folder).contents != self.artifact.manifest.contents:
+            raise ArtifactError(self.folder, "was made anew since this result; run the stage again for what it holds now")
+        return self.artifact
 
 
 @dataclass(frozen=True)
@@ -74,7 +87,7 @@ class Verdict(Result):
     @property
     def report(self) -> Mapping[str, Any]:
         """Everything that was found (docs/howto/diagnose.md)."""
-        return report_of(self.folder)
+        return report_of(self._intact.folder)
 
     @property
     def verdict(self) -> str:

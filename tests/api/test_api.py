@@ -77,6 +77,10 @@ def test_a_stage_is_the_same_from_python_and_from_the_command_line(elsewhere: Pa
     assert "<th>episodes</th>" in made._repr_html_()
     again = gsl.run("collect", world="nao_ideal", preset="toy", name="here", workers=1, **{"task.duration": 0.6})
     assert again.artifact.unchanged
+    assert again.metrics == made.metrics
+    gsl.run("collect", world="nao_ideal", preset="toy", name="here", workers=1, task={"duration": 0.4}, force=True)
+    with pytest.raises(GslError, match="here/collect_real: was made anew since this result; run the stage again"):
+        _ = made.metrics
 
 
 def test_a_component_goes_as_it_is(elsewhere: Path) -> None:
