@@ -64,7 +64,7 @@ add_stage(
 add_stage(app, "survey", "See how far real worlds are from the simulator.")
 add_stage(app, "answer", "Check logs and measured returns of a real robot, and take them in for a request.")
 add_stage(app, "rehearse", "Let a simulated world answer a request as the real robot would.")
-add_stage(app, "iterate", "The whole chain, again and again, until the real return stops improving.")
+add_stage(app, "iterate", "The whole chain; with iterations=3 again, while the real return improves.")
 
 
 IMPORT = "Bring logs of a real robot: CSV, JSON, npz, parquet or bags, by a small mapping."
@@ -151,7 +151,10 @@ def robot(
     write_robot(name, out, Console(json=json))
 
 
-_INIT = "also out=DIR, joints=A,B (controlled, in order), effort= [N·m] and velocity= [rad/s] where the URDF says none"
+_INIT = (
+    "also out=DIR, joints=A,B (controlled, in order), period= [s] of your logs, and effort= [N·m], velocity= [rad/s], "
+    "lower= and upper= [rad] where the URDF says none"
+)
 
 
 @app.command()
@@ -172,7 +175,7 @@ def root(
     ctx: typer.Context,
     version: Annotated[bool, typer.Option("--version", is_eager=True, help="Print the version.")] = False,
     quiet: Annotated[
-        bool, typer.Option("--quiet", "-q", help="Say results, warnings and errors alone; after any command.")
+        bool, typer.Option("--quiet", "-q", help="Say only results, warnings and errors; after any command.")
     ] = False,
 ) -> None:
     """Grounded simulation learning: from a few real trajectories to a policy that works on the robot."""

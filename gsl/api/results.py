@@ -76,7 +76,9 @@ class Result:
     def _intact(self) -> Artifact:
         """The artifact, if no other one lies in its folder by now."""
         if manifest.read(self.folder).contents != self.artifact.manifest.contents:
-            raise ArtifactError(self.folder, "was made anew since this result; run the stage again for what it holds now")
+            raise ArtifactError(
+                self.folder, "was made anew since this result; run the stage again for what it holds now"
+            )
         return self.artifact
 
 

@@ -24,7 +24,7 @@ class Mlp:
         tuple[Annotated[int, setting("", ge=1)], ...], setting("units of the hidden layers; none for a linear policy")
     ] = (64, 64)
     seed: Annotated[int, setting("of the first weights", ge=0)] = 0
-    sizes: Annotated[tuple[int, int, int], setting("states, actions, choices; the world tells")] = (1, 1, 0)
+    sizes: Annotated[tuple[int, int, int], setting("states, actions, choices; by default the world's")] = (1, 1, 0)
 
     def size_for(self, layout: Layout) -> Mlp:
         """Return the policy for a world.

@@ -30,7 +30,7 @@ from gsl.policies.wiring_audit import audit
 OFFSET = 0.25  # scale of an offset: a quarter of a radian, or of half a range, is bold for a trained policy
 
 File = Annotated[str, setting("of the network", min_length=1)]
-Joints = Annotated[tuple[str, ...], setting("of its actions; the world tells")]
+Joints = Annotated[tuple[str, ...], setting("of its actions; by default the world's")]
 
 
 class Ports(NamedTuple):

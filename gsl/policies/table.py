@@ -17,7 +17,7 @@ class ActionTable:
     """Its parameters are numbers of actions; π0 takes the same everywhere."""
 
     action: Annotated[int, setting("action of π0", ge=0)] = 0
-    sizes: Annotated[tuple[int, int], setting("states and actions; the world tells")] = (0, 0)
+    sizes: Annotated[tuple[int, int], setting("states and actions; by default the world's")] = (0, 0)
 
     def size_for(self, layout: Layout) -> ActionTable:
         """Return the policy for a world.

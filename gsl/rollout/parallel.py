@@ -38,7 +38,7 @@ def _some(workers: int) -> int:
 
 
 Workers = Annotated[
-    int, setting("processes; -1 for one a core, 1 for none beside this one", ge=-64, le=1024), AfterValidator(_some)
+    int, setting("processes; -1 is one a core, 1 none beside this one", ge=-64, le=1024), AfterValidator(_some)
 ]
 
 

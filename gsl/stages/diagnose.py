@@ -67,7 +67,7 @@ class Diagnose:
     tolerance: Tolerance = 0.0
     limits: Annotated[bool, setting("ask how much of what is not named there may be all the same")] = False
     held_out: Annotated[
-        Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
+        Mapping[str, Any], setting("labels of the trajectories that are for checking; {} is every second motion")
     ] = field(default_factory=dict)
     trust: Annotated[tuple[str, ...], setting("modules of your own whose classes the policies' files may name")] = ()
     audit: Annotated[bool, setting("look at the wiring first, and name no physics where it explains the gap")] = True

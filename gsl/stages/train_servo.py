@@ -55,7 +55,7 @@ class TrainServo:
     )
     tolerance: Tolerance = 0.0
     held_out: Annotated[
-        Mapping[str, Any], setting("labels of the trajectories that are for checking; none for every second motion")
+        Mapping[str, Any], setting("labels of the trajectories that are for checking; {} is every second motion")
     ] = field(default_factory=dict)
     members: Annotated[int, setting("of an ensemble; a further one takes a third of the time", ge=1, le=64)] = 1
     workers: Workers = -1
