@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -59,7 +60,7 @@ def diagnose(
     log = _widen_floor(prepare(batch, lump(plant.robot), options), nominal, options)
     if reference is not None:
         tick("calibrating the simulator on the reference")
-        baseline = calibrate_on(cut_log(reference, log.robot), nominal, options, tick)
+        baseline = calibrate_on(_prepare_reference(reference, log.robot, options), nominal, options, tick)
         log, nominal, options = baseline.take_out(log, nominal, options)
     if not options.clocks:
         tick("setting the clocks")
@@ -80,7 +81,7 @@ def diagnose(
     if options.duels and not log.walking and chosen.candidates:
         tick("self-test: can the causes that are left be separated")
         trials = duel(log, problem, rivals, options)
-    verdict = _judge(log, rivals, trials, options).judge(selection, missing)
+    verdict = _judge(log, rivals, trials, chances, options).judge(selection, missing)
     lacking = verdict.word == "unknown" and missing > 1.0
     forms = find_forms(log, problem.simulator, options.verdict.law) if lacking else ()
     tested = chances, tuple(trials)
@@ -94,12 +95,23 @@ def prepare(batch: Batch, robot: Robot, options: Options) -> Log:
     return log.with_model_error(np.where(ours, options.tolerance, 0.0)) if options.tolerance else log
 
 
-def _widen_floor(log: Log, nominal: Nominal, options: Options) -> Log:
-    """Refuse a log of too few windows; add to the floor of a walk what its log does not show."""
+def _prepare_reference(batch: Batch, robot: Robot, options: Options) -> Log:
+    """Return a reference as a log, of which no label holds a part out; refuse one of too few windows."""
+    log = prepare(batch, robot, replace(options, held_out={}))
+    _check_parts(log, "the reference has ")
+    return log
+
+
+def _check_parts(log: Log, whose: str = "") -> None:
     if not len(log.train) or not len(log.held_out):
         raise InputError(
-            "too little to fit and to check: two motions, or one trajectory, of some seconds are the least"
+            f"{whose}too little to fit and to check: two motions, or one trajectory, of some seconds are the least"
         )
+
+
+def _widen_floor(log: Log, nominal: Nominal, options: Options) -> Log:
+    """Refuse a log of too few windows; add to the floor of a walk what its log does not show."""
+    _check_parts(log)
     if not log.walking:
         return log
     step = fitting_step(nominal.step, log.period)
@@ -156,14 +168,21 @@ def _survivors(selection: Selection, how: VerdictSettings) -> list[Hypothesis]:
     return survivors
 
 
-def _judge(log: Log, rivals: Sequence[Hypothesis], trials: Sequence[Trial], options: Options) -> Judge:
-    """Return who judges a log, with what the duels say of the cost of noise and of differences by chance."""
+def _judge(
+    log: Log, rivals: Sequence[Hypothesis], trials: Sequence[Trial], chances: Sequence[Chance], options: Options
+) -> Judge:
+    """Return who judges a log, with what simulated logs say of the cost of noise and of differences by chance."""
     how, noise_cost = options.verdict, options.search.noise_cost
     own = [trial for trial in trials if trial.truth == rivals[0].names]
     least = 0.0 if log.shaking_share else noise_cost  # rows of a joint that shakes are not scaled to cost as noise does
     expected = max(least, float(np.mean([trial.level for trial in own]))) if own else noise_cost
+    worst = 1.0
+    if chances and not rivals[0].candidates:  # what a calibration leaves of few motions, though there is no gap
+        expected = max(expected, float(np.median([done.level for done in chances])))
+        worst = max(worst, float(np.median([done.worst for done in chances])))
     return Judge(
         expected * (1.0 + log.noise.slack),
+        worst,
         _margins(rivals, own),
         measure_mistakes(rivals, trials),
         how.walk_doubt if log.walking else how.shaking_doubt * log.shaking_share,

@@ -43,10 +43,14 @@ class Chance(NamedTuple):
     Attributes:
         gain: In all.
         freed: By freeing the cost of shifts.
+        level: Cost of a held-out residual that calibration alone leaves there.
+        worst: The same of the worst joint.
     """
 
     gain: float
     freed: float
+    level: float
+    worst: float
 
 
 @dataclass(frozen=True)

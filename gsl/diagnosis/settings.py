@@ -22,6 +22,8 @@ class FloorSettings:
     lags: int = 4  # ticks over which that correlation is looked for
     usual: float = 0.75  # share of the resting windows, the calmest, that is looked at: a push is no shaking
     rests: int = 2  # resting windows that it takes to judge
+    own: float = 0.45  # share of its motion that is a joint's own. Measured: to 0.39 if carried along, 0.58 shaking
+    ways: int = 2  # in which the other joints move together that are looked at
     still: float = 1e-6  # a command that moves less rests [rad]: rounding in a file
     spectrum: int = 64  # ticks of the windows whose spectrum shows white noise
     skipped: int = 3  # lowest frequencies of it, where the motion is
@@ -46,6 +48,7 @@ class RepeatSettings:
     same: float = 2e-3  # difference of commands that is rounding [rad]: a step of 4,096 in a turn is 1.5e-3
     clear: float = 5.0  # times that, by which a joint has to move to say when a motion began
     of_range: float = 0.02  # share of a joint's range by which that of a repeat may differ: its peaks fall between rows
+    jitter: float = 0.01  # by which a row's time may be off [s], at least a row
     outside: float = 0.02  # share of the rows in which commands may differ by more than a row's time makes them
     apart: float = 2.0  # by which loggers may have begun at different times [s]
     share: float = 0.8  # of the longer record that both have to have

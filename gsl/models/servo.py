@@ -136,9 +136,11 @@ def units(plant: Plant) -> dict[str, np.ndarray]:
     """
     each, servo = np.ones(len(plant.servo.kp)), plant.servo
     damping = np.where(servo.kd > 0.0, servo.kd, UNDAMPED * servo.kp)
+    damping = np.where(damping > 0.0, damping, UNDAMPED * np.minimum(servo.limit, UNLIMITED))  # driven by torques alone
+    rotor = servo.armature + 1e-3 * damping
     return {
         "kp": 0.2 * each, "kd": 0.3 * each, "limit": 0.1 * each, "delay": 0.01 * each, "coulomb": 0.05 * servo.limit,
-        "viscous": 0.1 * damping, "deadband": 0.003 * each, "armature": 0.3 * (servo.armature + 1e-3 * servo.kd),
+        "viscous": 0.1 * damping, "deadband": 0.003 * each, "armature": 0.3 * rotor,
         "offset": 0.005 * each, "load_friction": 0.1 * each, "duty_loss": 0.1 * each,
     }  # fmt: skip
 

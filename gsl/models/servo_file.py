@@ -21,7 +21,8 @@ def servo_file(reference: str) -> Path:
         ConfigError: There is none.
     """
     places = [Path(reference), Path("runs", reference)]
-    inside = ("", MAKER, f"iteration_01/{MAKER}")
+    made = [f"{MAKER}{kind}" for kind in ("", "_on_effects", "_members", "_on_effects_members")]
+    inside = ("", *(f"{home}{name}" for home in ("", "iteration_01/") for name in made))
     for path in [place / below / FILE for place in places for below in inside] + places[:1]:
         if path.is_file():
             return path

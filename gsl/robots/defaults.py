@@ -27,6 +27,13 @@ LOAD_MASS = 1.0  # of a lone servo's load [kg]; what of it is off the axis is th
 INERT = 300.0  # times what a joint moves: a rotor of more is hardly that of its motor
 WORTH = 0.5  # of a lone servo's torque that an unknown load may take
 NAO = 3.35  # peak torque of a NAO's legs, of which the torque unit is 1 [N·m]
+NAO_MASS = 5.0  # [kg]: a tenth of it is the range of an added mass
+OF_SERVOS = (
+    ("coulomb_friction", "torque"),
+    ("stribeck_friction", "torque"),
+    ("viscous_friction", "coefficient"),
+    ("armature", "inertia"),
+)
 _HEAVY_ROTORS = (
     "rotors are far heavier than what they move, and the robot may swing: {}; look at effort and velocity of these "
     "joints, say their armature in a robot file, or hold them"
@@ -63,9 +70,8 @@ def with_gains(robot: Robot, settings: Mapping[str, tuple[float | None, float | 
     remarks = robot.remarks if not light else (*robot.remarks, _HEAVY_ROTORS.format(", ".join(light)))
     peak = max(joint.effort * joint.size for joint in map(robot.joint, robot.motors))
     made = replace(robot, gains=gains, torque_unit=torque_unit(peak), remarks=remarks)
-    return replace(
-        made, ranges={**(softer_gains(made) if any(kp for kp, _ in settings.values()) else {}), **made.ranges}
-    )
+    soft = softer_gains(made) if any(kp for kp, _ in settings.values()) else {}
+    return replace(made, ranges={**soft, **wider_ranges(made), **made.ranges})
 
 
 def softer_gains(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:
@@ -79,6 +85,21 @@ def softer_gains(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:
     usual = settings_of(effect_class("servo_gain"))["kp"]
     assert usual.lower is not None and usual.upper is not None
     return {} if least >= usual.lower else {"servo_gain": dict.fromkeys(("kp", "kd"), (least, usual.upper))}
+
+
+def wider_ranges(robot: Robot) -> dict[str, dict[str, tuple[float, float]]]:
+    """Return the ranges of friction, rotors and loads of a robot that is larger than a NAO; nothing of a smaller one.
+
+    Friction and rotors grow with what servos can do, as their calibration does (`Robot.torque_unit`), loads with mass.
+    """
+    strength, weight = robot.torque_unit, sum(link.mass for link in robot.links.values()) / NAO_MASS
+    ranges = {}
+    for name, key, factor in [*((*pair, strength) for pair in OF_SERVOS), ("link_mass", "mass", weight)]:
+        usual = settings_of(effect_class(name))[key]
+        assert usual.lower is not None and usual.upper is not None
+        if factor > 1.0:
+            ranges[name] = {key: (usual.lower, factor * usual.upper)}
+    return ranges
 
 
 def lone_servos(

@@ -100,7 +100,7 @@ class TrainServo:
         self._write_world(folder, learned)
         servo_curves(folder / CURVES, self.sim.plant, model, fitting_step(self.sim.step, exp.period), exp.period)
         metrics = document(learned) | {"step": fitting_step(self.sim.step, exp.period), "period": exp.period}
-        for line in remarks(metrics):
+        for line in [*(f"a search will refuse it: {problem}" for problem in problems(metrics)), *remarks(metrics)]:
             console.status(f"warning: {line}")
         noises = dict(zip(model.joints, model.noise.tolist(), strict=True))
         metrics |= {"torque_noise": noises, "problems": problems(metrics)}

@@ -89,6 +89,8 @@ def learn_servo(
     _check_motion(exp)
     step = fitting_step(step, exp.period)
     parts, start = split(exp, labelled=labelled), neutral(plant, np.random.default_rng(seed))
+    if not len(parts.train):
+        raise InputError("what is held out leaves nothing to learn from; hold out fewer trajectories, or log more")
     splits = [parts, *leave_out(exp, parts)]
     with ThreadPoolExecutor(threads) as pool:
         bench = ServoBench(exp, Replays(plant, step, exp.period, threads, pool), start)

@@ -71,6 +71,7 @@ def _without(exp: Log, parts: Split, index: np.ndarray) -> Split:
 
 
 def _share(exp: Log, part: np.ndarray, every: int) -> np.ndarray:
-    """Return the windows of every so many'th motion, or every so many'th window of few motions."""
-    names = np.unique(exp.pieces.record[part])
-    return part[np.isin(exp.pieces.record[part], names[::every])] if len(names) >= every else part[::every]
+    """Return the windows of every so many'th motion, repeats with it, or every so many'th window of few motions."""
+    motion = np.array([repeat.motion for repeat in exp.repeats])[exp.pieces.record[part]]
+    names = np.unique(motion)
+    return part[np.isin(motion, names[::every])] if len(names) >= every else part[::every]

@@ -20,7 +20,7 @@ from gsl.training.data import FALLS, of_policy
 from gsl.validation.reachability import Reachability, reachability
 from gsl.validation.replay import PAST, Deviations, places, predict_no_change, replay_starts
 from gsl.validation.report import BARE, GROUNDED, OFF, PI0, STILL, GroundingReport
-from gsl.worlds.ensemble import take_turns
+from gsl.worlds.ensemble import EnsembleWorld, take_turns
 
 REPLAYS = 60  # of each group of trajectories, at most
 ASKED = 40  # steps of which it is asked whether the simulator can do them
@@ -127,9 +127,10 @@ def _compare(env: Any, grounding: Any, episodes: Sequence[Any], seed: int) -> di
 def pi0_in(
     scenario: Scenario, parameters: np.ndarray, seed: int, *, patience: int = EPISODES
 ) -> list[tuple[float, bool]]:
-    """Return value and fall of some episodes of π0, up to one fall more than `patience`."""
+    """Return value and fall of some episodes of π0, one in each member of an ensemble, up to more than `patience`."""
     env, done = scenario.make(), []
-    for index in range(EPISODES):
+    members = len(scenario.world.members) if isinstance(scenario.world, EnsembleWorld) else 1
+    for index in range(max(EPISODES, members)):
         episode = rollout(scenario, env, parameters, take_turns(scenario.world, derive_seed(seed, index), index))
         done.append((episode.value, episode.ended_in_a_fall))
         if sum(fell for _, fell in done) > patience:

@@ -32,7 +32,7 @@ RATE, MOST = 0.3, 1.4  # of the rising load [effort/s], and where it ends [effor
 DRAG = 0.25  # on a joint that gives way [effort·s/rad]: without it the load would also have to move its inertia
 BEFORE = -1e-9  # latest time of a clock before an episode, whose zero is rounded [s]
 REMEMBERED = 16  # robots without a grounding, measured once a process: a study has a few worlds and many trials
-YIELDED = 0.1  # deflection beyond the linear one at which a joint has given way [rad]: 5 times the NAO's at its limit
+YIELDED = 0.1  # deflection beyond the linear one at which a joint has given way [Joint.size]: 5 times the NAO's
 
 
 @dataclass(frozen=True)
@@ -130,7 +130,8 @@ def _load_joints(world: BulletWorld, plant: Plant, grounding: Grounding, seed: i
         swing = Swing(AMPLITUDE * effort * loaded, world.step)
         hold(env, grounding, swing, swing.duration, derive_seed(seed, "swing", number))
         quantities[:3, loaded] = swing.answer()[:, loaded]
-        rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, quantities[0])
+        far = YIELDED * robot.sizes
+        rising = Ramp(RATE * effort * loaded * inwards(robot), DRAG * effort * loaded, quantities[0], far)
         hold(env, grounding, rising, MOST / RATE, derive_seed(seed, "yield", number))
         quantities[3, loaded] = np.where(rising.yielded, rising.torque, MOST * effort)[loaded]
     env.close()
@@ -184,14 +185,15 @@ class Ramp:
         rate: On each motor [N·m/s], 0 for those that are not loaded, shape (n_motors,).
         drag: Taken off the load per speed [N·m·s/rad], shape (n_motors,).
         stiffness: By which a joint yields before it gives way [N·m/rad], shape (n_motors,).
+        far: Deflection beyond that at which it has given way [rad], shape (n_motors,).
 
     Attributes:
         yielded: Which motors have given way, shape (n_motors,).
         torque: At which load [N·m], shape (n_motors,).
     """
 
-    def __init__(self, rate: np.ndarray, drag: np.ndarray, stiffness: np.ndarray) -> None:
-        self._rate, self._drag, self.drag = rate, drag, np.zeros_like(drag)
+    def __init__(self, rate: np.ndarray, drag: np.ndarray, stiffness: np.ndarray, far: np.ndarray) -> None:
+        self._rate, self._drag, self.drag, self._far = rate, drag, np.zeros_like(drag), far
         usable = np.isfinite(stiffness) & (stiffness > 0.0)
         self._softness = np.where(usable, 1.0 / np.where(usable, stiffness, 1.0), 0.0)
         self._still: np.ndarray | None = None
@@ -209,7 +211,7 @@ class Ramp:
         if self._still is None:
             self._still = path[0, 0].copy()
         load = np.outer(times, self._rate) - self.drag * path[:, 1]
-        beyond = np.sign(self._rate) * (path[:, 0] - self._still - self._softness * load) > YIELDED
+        beyond = np.sign(self._rate) * (path[:, 0] - self._still - self._softness * load) > self._far
         new, first = beyond.any(axis=0) & ~self.yielded, beyond.argmax(axis=0)
         self.torque[new] = np.abs(load[first, np.arange(len(first))])[new]
         self.yielded |= new

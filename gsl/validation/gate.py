@@ -23,7 +23,7 @@ from gsl.grounding.none import NoGrounding
 from gsl.grounding.random_choice import RandomChoice
 from gsl.rollout.rollout import Scenario
 from gsl.storage.documents import write_json
-from gsl.validation.check import EPISODES, pi0_in
+from gsl.validation.check import pi0_in
 from gsl.validation.uncharged import warn_uncharged
 from gsl.worlds.ensemble import EnsembleWorld
 
@@ -63,9 +63,9 @@ class Gate:
         """Return the seed of a part of a check."""
         return derive_seed(self.seed, what)
 
-    def count_falls(self, scenario: Scenario, what: str = "check") -> int:
-        """Return in how many of `EPISODES` episodes π0 falls."""
-        return sum(fell for _, fell in pi0_in(scenario, self.parameters, self.seed_of(what)))
+    def walk(self, scenario: Scenario, what: str = "check") -> list[bool]:
+        """Let π0 act in some episodes; return in which of them it falls."""
+        return [fell for _, fell in pi0_in(scenario, self.parameters, self.seed_of(what))]
 
     def check_falls(self, scenario: Scenario, where: str, advice: str) -> Mapping[str, Any]:
         """Let a scenario pass in which π0 keeps its feet; there is nothing else to check of it.
@@ -78,8 +78,8 @@ class Gate:
         Raises:
             Refused: π0 falls and `accept` is not set.
         """
-        fell = self.count_falls(scenario)
-        problems = [f"π0 falls in {fell} of {EPISODES} episodes {where}"] if fell else []
+        fell = self.walk(scenario)
+        problems = [f"π0 falls in {sum(fell)} of {len(fell)} episodes {where}"] if any(fell) else []
         self.report({"acceptable": not problems, "problems": problems})
         self.judge(problems, advice)
         return {"grounding_acceptable": not problems}

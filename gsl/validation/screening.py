@@ -76,6 +76,6 @@ def screen(
 
 
 def passing(screened: Mapping[str, Screened]) -> list[str]:
-    """Return the policies that never fell; if every one did, the one that fell least."""
-    standing = [name for name, result in screened.items() if not result.falls]
-    return standing or [min(screened, key=lambda name: screened[name].share)]
+    """Return the policies that never fell; if every one did, those that fell least."""
+    least = min((result.share for result in screened.values()), default=0.0)
+    return [name for name, result in screened.items() if result.share == least]

@@ -12,7 +12,7 @@ from gsl.core.servo_law import HIDDEN, LAYERS, ServoLaw, no_law, weights
 from gsl.worlds.drive_train import ROTOR_SHARE, STIFFEST
 from gsl.worlds.encoder import REMEMBERED, fill_history
 
-COMMANDS = 16  # control periods of targets that are remembered: the longest delay
+COMMANDS = 128  # control periods of targets that are remembered, 0.127 s of a log at 1 kHz: the longest delay
 
 (OUTPUT_ARMATURE, ROTOR, SAG, PER_AMPERE, HARDNESS, SIZE, GROUP, STIFFNESS, TORQUE, LAG_SHARE) = range(
     len(ROW), len(ROW) + 10

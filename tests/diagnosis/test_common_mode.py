@@ -117,7 +117,7 @@ def test_what_frees_the_shifts_stands_whatever_chance_gains_on_residuals() -> No
 
 def test_where_joints_shake_what_frees_the_shifts_stands_as_anything_else() -> None:
     knee = problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
-    chances = [Chance(1e4, 0.0)]
+    chances = [Chance(1e4, 0.0, 1.0, 1.0)]
     search = Search(knee, knee.fit_calibration(), Thresholds.of(chances, knee.settings, 1e-9))
     assert not search.select().chosen.candidates
 
@@ -125,7 +125,7 @@ def test_where_joints_shake_what_frees_the_shifts_stands_as_anything_else() -> N
 @pytest.mark.parametrize(("freed", "causes"), [(20.0, 1), (1e4, 0)])
 def test_what_chance_frees_of_the_shifts_stands_for_nothing(freed: float, causes: int) -> None:
     knee = problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
-    thresholds = Thresholds.of([Chance(1e4, freed), Chance(5e3, 0.0)], knee.settings, 0.0)
+    thresholds = Thresholds.of([Chance(1e4, freed, 1.0, 1.0), Chance(5e3, 0.0, 1.0, 1.0)], knee.settings, 0.0)
     chosen = Search(knee, knee.fit_calibration(), thresholds).select().chosen
     assert len(chosen.candidates) == causes
 

@@ -9,7 +9,7 @@ from swinging_arm import FEW, NOISE, PERIOD, QUICK, arm, found, log, logged, mot
 
 from gsl.core.plant import Plant, nominal
 from gsl.core.setting import component, setting
-from gsl.core.trajectory import Batch
+from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.diagnose import diagnose
 from gsl.diagnosis.hypothesis.candidates import library
 from gsl.diagnosis.hypothesis.problem import Problem
@@ -22,6 +22,7 @@ from gsl.diagnosis.simulate import calibration
 from gsl.diagnosis.simulate.simulator import simulator_of
 from gsl.diagnosis.verdict.document import document
 from gsl.effects.effect import SCOPE, Scope, apply_all, build, scope, use_own
+from gsl.errors import InputError
 from gsl.report.diagnosis_text import summary_lines
 from gsl.worlds.held import Held
 
@@ -157,6 +158,17 @@ def test_what_the_library_lacks_is_unknown() -> None:
     assert found({"command_latency": {"delay": 0.03}}, without=("command_latency", *lagging)).verdict.word == "unknown"
 
 
+ROWS = {"time": 51, "action": 50, "position": 51, "velocity": 51}  # of one window
+
+
+def test_a_reference_of_one_window_is_refused() -> None:
+    batch = log({})
+    short = replace(batch.episodes[0], **{key: getattr(batch.episodes[0], key)[:n] for key, n in ROWS.items()})
+    reference = replace(batch, episodes=(short,), metadata={})
+    with pytest.raises(InputError, match="the reference has too little to fit and to check: two motions"):
+        diagnose(batch, nominal(arm()), 0.002, FEW, lambda phase: None, reference=reference)
+
+
 def test_a_reference_log_takes_the_model_error_away() -> None:
     """The diagnoser's plant is wrong in a way of its own, in both logs."""
     foreign = {"viscous_friction": {"coefficient": 0.25}}
@@ -245,7 +257,7 @@ def test_of_motions_without_names_blocks_of_each_are_held_out() -> None:
 
 def test_of_repeats_of_one_motion_the_same_times_are_held_out() -> None:
     batch = log({})
-    rows = {"time": 131, "action": 130, "position": 131, "velocity": 131}  # three windows of each
+    rows = {key: n + 80 for key, n in ROWS.items()}  # three windows of each
     both = (batch.episodes[k] for k in (0, 8))
     episodes = tuple(
         replace(episode, **{key: getattr(episode, key)[:n] for key, n in rows.items()}) for episode in both
@@ -267,10 +279,25 @@ def test_no_latency_is_tried_that_servos_do_not_remember() -> None:
     latency = next(candidate for candidate in library(arm()) if candidate.effect == "command_latency")
     short = latency.up_to(0.015)
     assert (short.bounds.max(), short.grid.max()) == (0.015, 0.015) and len(short.grid) < len(latency.grid)
-    fast = replace(cut_log(log({}), arm()), period=0.001)
+    fast = replace(cut_log(log({}), arm()), period=1e-4)
     problem = Problem.of(fast, simulator_of(cut_log(log({}), arm()), nominal(arm()), 0.002), QUICK, lambda phase: None)
     (tried,) = (candidate for candidate in problem.library if candidate.effect == "command_latency")
-    assert tried.bounds.max() == pytest.approx(0.015)
+    assert tried.bounds.max() == pytest.approx(0.0127)
+
+
+def test_a_latency_of_tens_of_milliseconds_shows_in_a_log_at_1_khz() -> None:
+    rng, period, paths = np.random.default_rng(1), 0.001, motions()
+    paths = {name: np.repeat(path, 20, axis=0)[:2000] for name, path in paths.items()}
+    late = Held.of(apply_all(nominal(arm()), build({"command_latency": {"delay": 0.025}})), 0.0005, period)
+    played = late.play([*paths.values()], [path[0] for path in paths.values()], 1000)
+    noisy = [path + 5e-4 * rng.standard_normal(path.shape) for path in played]
+    episodes = tuple(
+        Trajectory(period * np.arange(len(position)), targets, position, np.zeros_like(position))
+        for targets, position in zip(paths.values(), noisy, strict=True)
+    )
+    batch = Batch(episodes, arm().controlled, period, {"episodes": [{"policy": name} for name in paths]})
+    ((cause, value),) = diagnose(batch, nominal(arm()), 0.002, FEW, lambda phase: None).selection.chosen.pairs
+    assert cause.effect == "command_latency" and value[0] == pytest.approx(0.025, abs=1e-3)
 
 
 def test_replays_are_no_finer_than_a_late_encoder_is_remembered() -> None:

@@ -7,8 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from swinging_arm import PERIOD, arm
 
 from gsl.core.body import lump
+from gsl.core.plant import nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.files import check_log, log_files, on_ground, read_logs
 from gsl.diagnosis.log.floor import roughness
@@ -16,6 +18,7 @@ from gsl.diagnosis.log.log import cut_log
 from gsl.errors import GslError
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import write
+from gsl.worlds.held import Held
 
 NAO = lump(nao())
 REST = np.array([0.5 * NAO.stance.get(joint, 0.0) for joint in NAO.controlled])
@@ -217,6 +220,24 @@ def ring(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
     commands[:, 0] += 0.1 * (np.arange(900) // 60 % 2)
     position[:] = np.vstack([commands[:1], commands])
     position[:, 0] += 0.1 * np.exp(-since / 6.0) * np.cos(0.5 * since)
+
+
+@pytest.mark.parametrize("parallel", [True, False])
+def test_a_joint_that_its_neighbour_takes_along_does_not_shake(parallel: bool) -> None:
+    """One joint moves at a time, and gravity and inertia bend the servo of the other."""
+    robot, time, rng = arm(), PERIOD * np.arange(150), np.random.default_rng(0)
+    shoulder, elbow = robot.joints
+    robot = replace(robot, joints=(shoulder, replace(elbow, axis=shoulder.axis))) if parallel else robot
+    waves = [np.sin(2 * np.pi * 0.6 * time), np.sin(2 * np.pi * (0.5 + 0.7 * time) * time)]
+    paths = [0.5 * np.outer(wave * np.minimum(1.0, time / 0.3), side) for wave in waves for side in np.eye(2)] * 2
+    played = Held.of(nominal(robot), 0.0005, PERIOD).play(paths, [path[0] for path in paths], 50)
+    noisy = [path + 3e-4 * rng.standard_normal(path.shape) for path in played]
+    episodes = [
+        Trajectory(PERIOD * np.arange(151), targets, position, np.zeros_like(position))
+        for targets, position in zip(paths, noisy, strict=True)
+    ]
+    finer = replace(robot, encoder_step=5e-4)
+    assert not cut_log(Batch(tuple(episodes), robot.controlled, PERIOD, {}), finer).comparison.shaking.any()
 
 
 @pytest.mark.parametrize(

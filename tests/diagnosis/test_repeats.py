@@ -77,6 +77,15 @@ def test_a_coarse_encoder_is_noise_and_a_repeat_that_wanders_is_not(dither: floa
     assert (floor.sd[3] > 0.004) == (dither is not None)
 
 
+def test_a_late_row_of_a_fast_logger_is_jitter() -> None:
+    fast, rng = 0.001, np.random.default_rng(3)
+    time = fast * np.arange(3000)
+    first, again = (sines(when) for when in (time, time - 0.004 * rng.uniform(size=len(time))))
+    position = np.zeros((3001, 2))
+    records = [Record("", targets, position, position) for targets in (first, again)]
+    assert [repeat.motion for repeat in find_repeats(records, fast)] == [0, 0]
+
+
 def test_another_motion_is_none() -> None:
     def larger(time: np.ndarray) -> np.ndarray:
         return 1.05 * sines(time)

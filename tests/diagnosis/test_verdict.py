@@ -12,7 +12,7 @@ from swinging_arm import arm, log
 from test_plausibility import claim
 
 from gsl.core.plant import nominal
-from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
+from gsl.diagnosis.hypothesis.hypothesis import Gain, Hypothesis, gain
 from gsl.diagnosis.log.log import cut_log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.reference import Nominal
@@ -65,6 +65,19 @@ def test_a_cause_in_whose_place_no_other_was_tried_is_not_certain() -> None:
     tried = Judge(1.0).judge(selection(with_both(shoulder, elbow, 100.0), shoulder, elbow, *rivals))
     assert [cause.rival for cause in tried.causes] == ["load_friction", "load_friction"]
     assert min(cause.probability for cause in tried.causes) > VerdictSettings.unrivalled
+
+
+def test_one_held_out_sample_says_nothing_of_how_much_a_gain_varies() -> None:
+    first, other = (replace(friction("elbow", cost), costs=np.array([cost])) for cost in (100.0, 300.0))
+    assert gain(first, other) == Gain(200.0, -np.inf, np.inf)
+
+
+@pytest.mark.parametrize(("left", "word"), [(1.0, "unknown"), (3.0, "no_gap")])
+def test_what_a_calibration_leaves_of_logs_without_a_gap_is_no_gap(left: float, word: str) -> None:
+    """Of few motions a calibration leaves more than noise: simulated logs say how much."""
+    off = replace(NONE, costs=2.5 * NONE.counts)
+    tried = replace(selection(off), none=off)
+    assert Judge(left, left).judge(tried).word == word
 
 
 @pytest.mark.parametrize(("cost", "rival"), [(1000.0, "load_friction"), (1200.0, None)])

@@ -115,6 +115,14 @@ def written(tmp_path: Path) -> Callable[[str], Path]:
     return write
 
 
+def test_friction_and_rotors_of_a_strong_robot_may_be_larger(written: Callable[[str], Path]) -> None:
+    text = "urdf: arm.urdf\nranges: {armature: {inertia: [0, 0.2]}}\njoints: {elbow: {effort: 150, velocity: 5}}"
+    strong, usual = robot(str(written(text))), robot(str(EXAMPLE))
+    assert strong.ranges["coulomb_friction"] == {"torque": (0.0, pytest.approx(0.3 * 150.0 / 3.35))}
+    assert strong.ranges["armature"] == {"inertia": (0.0, 0.2)}
+    assert "coulomb_friction" not in usual.ranges
+
+
 def test_a_file_beside_it_chooses_joints_and_says_what_is_known(written: Callable[[str], Path]) -> None:
     text = """
         urdf: arm.urdf

@@ -230,6 +230,16 @@ def test_each_condition_is_left_out_in_turn() -> None:
     assert not np.isin(exp.pieces.record[last.judge], exp.pieces.record[last.test]).any()
 
 
+def test_repeats_of_a_motion_are_on_one_side() -> None:
+    once = log(real(SLOW), motions=4, seconds=3.0)
+    twice = replace(once, episodes=once.episodes * 2, metadata={"episodes": about(once) * 2})
+    exp = cut_log(twice, ROBOT)
+    parts = split(exp, labelled=False)
+    motion = np.array([repeat.motion for repeat in exp.repeats])[exp.pieces.record]
+    train, judge, test = ({*motion[part]} for part in (parts.train, parts.judge, parts.test))
+    assert train and judge and test and not (train & judge or judge & test or train & test)
+
+
 @pytest.mark.parametrize("period", [0.05, 0.005, 0.001])
 def test_slow_and_fast_logs_are_learned_from(period: float) -> None:
     """A step of 2 ms divides neither 5 ms nor 1 ms: replays take the nearest that does, or time would run wrong."""

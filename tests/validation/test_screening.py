@@ -35,9 +35,10 @@ def test_what_stands_walks_to_the_end_and_what_falls_at_once_walks_no_more() -> 
     assert screenings[0]["bad"].falls > 0 and screenings[0]["bad"].episodes == FIRST
 
 
-def test_policies_that_never_fell_pass_or_the_one_that_fell_least() -> None:
+def test_policies_that_never_fell_pass_or_those_that_fell_least() -> None:
     assert passing({"a": Screened(0, 30), "b": Screened(1, 30), "c": Screened(0, 30)}) == ["a", "c"]
     assert passing({"a": Screened(2, 4), "b": Screened(1, 30), "c": Screened(3, 30)}) == ["b"]
+    assert passing({"a": Screened(1, 4), "b": Screened(2, 4), "c": Screened(1, 4)}) == ["a", "c"]
 
 
 @pytest.mark.parametrize(

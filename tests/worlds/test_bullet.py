@@ -177,4 +177,4 @@ def test_what_does_not_fit_is_refused() -> None:
     with pytest.raises(ConfigError, match="multiple"):
         world(step=0.003)
     with pytest.raises(ConfigError, match="delay"):
-        world({"command_latency": {"delay": 0.15}}, period=0.004, step=0.002)
+        world({"command_latency": {"delay": 0.28}}, period=0.002, step=0.002)

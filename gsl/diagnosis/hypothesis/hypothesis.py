@@ -136,9 +136,14 @@ class Gain:
 
 
 def gain(better: Hypothesis, worse: Hypothesis, *, samples: int = 1000, seed: int = 0) -> Gain:
-    """Compare two hypotheses sample by sample; the difference of their prior costs is in every sample."""
+    """Compare two hypotheses sample by sample; the difference of their prior costs is in every sample.
+
+    One sample alone does not say how much a gain varies.
+    """
     difference = worse.costs - better.costs
     extra = worse.fit.prior_cost - better.fit.prior_cost
+    if len(difference) == 1:
+        return Gain(float(difference.sum() + extra), -np.inf, np.inf)
     totals = difference[_resample(len(difference), samples, seed)].sum(axis=1) + extra
     low, high = np.quantile(totals, [0.025, 0.975])
     return Gain(float(difference.sum() + extra), float(low), float(high))

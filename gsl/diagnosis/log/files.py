@@ -220,8 +220,9 @@ def _check_units(batch: Batch, robot: Robot, name: str) -> None:
         limits = robot.joint(joint)
         for what in ("action", "position"):
             values = np.concatenate([getattr(episode, what)[:, k] for episode in batch.episodes])
-            beyond = float(max(limits.lower - values.min(), values.max() - limits.upper)) / limits.size
-            reaches.append((beyond, f"{what}.{joint}", float(values[np.argmax(np.abs(values))]), limits))
+            below, above = limits.lower - values.min(), values.max() - limits.upper
+            far = float(values.min() if below > above else values.max())
+            reaches.append((float(max(below, above)) / limits.size, f"{what}.{joint}", far, limits))
     beyond, column, far, limits = max(reaches, key=lambda reach: reach[0])
     if beyond > BEYOND:
         other = "are these millimetres?" if limits.slides else "are these degrees?"

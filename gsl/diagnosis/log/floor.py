@@ -179,16 +179,21 @@ def white_level(records: Sequence[Record], settings: FloorSettings) -> np.ndarra
 
 
 def _find_restless(records: Sequence[Record], white: np.ndarray, most: np.ndarray, how: FloorSettings) -> np.ndarray:
-    """Return which joints are rougher than `most` where commands have been smooth for a while, shape (n_channels,)."""
+    """Return which joints are rougher than `most` where commands have been smooth for a while, shape (n_channels,).
+
+    These are the commands of all joints, whose motion takes the others along; where they never are, its own.
+    """
     restless = np.zeros(len(white), dtype=bool)
     long = [record for record in records if len(record) > 2 * how.settled]
     if not long:
         return restless
     rough = np.vstack([third_differences(record.measured)[how.settled :] for record in long])
-    jerk = np.vstack([_jerk_of_commands(record, how.settled) for record in long])
-    for joint, still in enumerate(jerk.T[: len(white)] < how.smooth * white[: jerk.shape[1], None] ** 2):
-        if still.sum() > how.settled:
-            restless[joint] = np.mean(rough[still, joint]) > most[joint] ** 2
+    jerk = np.vstack([_jerk_of_commands(record, how.settled) for record in long])[:, : len(white)]
+    smooth = jerk < how.smooth * white[: jerk.shape[1]] ** 2
+    still = smooth.all(axis=1, keepdims=True)
+    for joint, rows in enumerate((smooth if still.sum() <= how.settled else smooth & still).T):
+        if rows.sum() > how.settled:
+            restless[joint] = np.mean(rough[rows, joint]) > most[joint] ** 2
     return restless
 
 

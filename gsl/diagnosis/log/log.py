@@ -192,7 +192,7 @@ def _hold_out(
         return ((pieces.tick - later) // block + motion[pieces.record]) % 2 == 1, False
     if motions > 1:
         return motion[pieces.record] % 2 == 1, True
-    return np.arange(len(pieces)) % 2 == 1, False
+    return pieces.tick // pieces.scored % 2 == 1, False
 
 
 def label_indices(records: Sequence[Mapping[str, Any]], asked: Mapping[str, Any]) -> list[int]:

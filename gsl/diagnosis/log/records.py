@@ -28,7 +28,7 @@ from gsl.worlds.servo_state import COMMANDS
 BASE = ("base.x", "base.y", "base.z", "base.roll", "base.pitch", "base.yaw")
 LOADED = 3.0  # on a foot that stands [N]
 FEW = 5  # records over which no bootstrap is drawn: its intervals would be far too narrow
-SMOOTHER = 7  # ticks of the cubic whose slope is a window's first velocity
+SMOOTHER, LONGEST, SHORTEST = 7, 0.14, 0.06  # rows of the cubic whose slope is a velocity; and at most, at least [s]
 
 
 @dataclass(frozen=True)
@@ -167,7 +167,8 @@ def slope(position: np.ndarray, period: float) -> np.ndarray:
     """Return a smoother's velocities [rad/s] through positions [rad], (T + 1, n_joints); NaN if these diverge."""
     if not np.isfinite(position).all():
         return np.full_like(position, np.nan)
-    length = min(SMOOTHER, len(position) - (len(position) + 1) % 2)
+    rows = max(3, min(SMOOTHER, round(LONGEST / period)), round(SHORTEST / period)) // 2 * 2 + 1
+    length = min(rows, len(position) - (len(position) + 1) % 2)
     return scipy.signal.savgol_filter(
         position, length, min(3, length - 1), deriv=1, delta=period, axis=0, mode="interp"
     )

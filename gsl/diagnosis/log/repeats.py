@@ -96,9 +96,10 @@ def _compare(first: np.ndarray, again: np.ndarray, period: float, how: RepeatSet
     before, after = _overlap(first, again, later)
     if len(before) < how.share * max(len(first), len(again)):
         return None
-    padded = np.pad(before, ((1, 1), (0, 0)), mode="edge")
-    near = np.array([padded[:-2], padded[1:-1], padded[2:]])  # a row late or early is the logger's
-    outside = (after < near.min(axis=0) - how.same) | (after > near.max(axis=0) + how.same)
+    near = 2 * max(1, round(how.jitter / period)) + 1  # rows: so much late or early is the logger's
+    low = scipy.ndimage.minimum_filter1d(before, near, axis=0, mode="nearest")
+    high = scipy.ndimage.maximum_filter1d(before, near, axis=0, mode="nearest")
+    outside = (after < low - how.same) | (after > high + how.same)
     if outside.mean(axis=0).max() > how.outside:
         return None
     return later + (_refine(before[:, moving], after[:, moving]) if moving.any() else 0.0)

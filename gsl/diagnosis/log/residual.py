@@ -95,7 +95,8 @@ def _bands(x: np.ndarray) -> np.ndarray:
     """Return the mean power but for the mean by band, shape (W, BANDS, n): white noise has its variance in each."""
     power = spectrum(x)
     edges = np.linspace(1, power.shape[1], BANDS + 1).round().astype(int)
-    return np.stack([power[:, a:b].mean(axis=1) for a, b in zip(edges[:-1], edges[1:], strict=True)], axis=1)
+    bands = zip(edges[:-1], np.maximum(edges[1:], edges[:-1] + 1), strict=True)  # a slow log has few frequencies
+    return np.stack([power[:, min(a, power.shape[1] - 1) : b].mean(axis=1) for a, b in bands], axis=1)
 
 
 def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSettings) -> Comparison:
@@ -114,7 +115,9 @@ def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSetti
     resting = moving < settings.still
     real = pieces.real[:, pieces.warm_up :]
     at_rest = [_calmest(real[rests, :, joint], settings.usual) for joint, rests in enumerate(resting.T)]
-    shaking = noise.restless[:joints] | [_shakes(x, noise.resolution, settings) for x in at_rest]
+    own = [_share_of_its_own(real[rests], joint, settings) for joint, rests in enumerate(resting.T)]
+    shakes = np.array([_shakes(x, noise.resolution, settings) for x in at_rest]) & (np.array(own) > settings.own)
+    shaking = noise.restless[:joints] | shakes
     calm = np.median(noise.sd[~shaking]) if not shaking.all() else settings.unmeasured * noise.resolution
     sway = np.array([_sway(x) if shakes else 0.0 for x, shakes in zip(at_rest, shaking, strict=True)])
     sway = np.where(shaking, np.maximum(sway, noise.slow), 0.0)
@@ -124,10 +127,42 @@ def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSetti
 
 def _calmest(rest: np.ndarray, usual: float) -> np.ndarray:
     """Return the calmest of resting windows, shape (W, scored), each less its line."""
-    x = rest - rest.mean(axis=1, keepdims=True)
-    line = np.linspace(-1.0, 1.0, rest.shape[1])
-    x = x - np.outer(x @ line / (line @ line), line)
-    return x[np.argsort((x**2).mean(axis=1))[: max(1, round(usual * len(x)))]]
+    x = _take_out(rest, _line(rest.shape[1]))
+    return np.asarray(x[np.argsort((x**2).mean(axis=1))[: max(1, round(usual * len(x)))]])
+
+
+def _line(length: int) -> np.ndarray:
+    return np.linalg.qr(np.vander(np.linspace(-1.0, 1.0, length), 2))[0]
+
+
+def _take_out(x: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """Return windows, shape (W, T), less what an orthonormal basis explains, shape (T, k) or (W, T, k)."""
+    column = x[..., None]
+    return np.asarray((column - basis @ (np.swapaxes(basis, -1, -2) @ column))[..., 0])
+
+
+def _share_of_its_own(rest: np.ndarray, joint: int, settings: FloorSettings) -> float:
+    """Return the share of a resting joint's motion that the other joints' does not explain; 1 of a single joint.
+
+    Gravity and inertia of the others bend its servo: by their positions, velocities and accelerations.
+
+    Args:
+        rest: Positions in the windows in which it rests, shape (W, scored, n_channels).
+        joint: Which.
+        settings: What counts as usual, and of how many ways in which the others move.
+    """
+    (count, length, channels), ways = rest.shape, settings.ways
+    if not count or channels == 1 or length < 2 * (3 * ways + 2):
+        return 1.0
+    others = np.delete(rest, joint, axis=2)
+    moved = np.linalg.svd(others - others.mean(axis=1, keepdims=True), full_matrices=False)[0][..., :ways]
+    rate = np.gradient(moved, axis=1)
+    line = np.broadcast_to(_line(length), (count, length, 2))
+    basis = np.linalg.qr(np.concatenate([line, moved, rate, np.gradient(rate, axis=1)], axis=2))[0]
+    x = rest[..., joint]
+    moves, left = ((_take_out(x, part) ** 2).sum(axis=1) / (length - part.shape[-1]) for part in (line, basis))
+    usual = np.argsort(moves)[: max(1, round(settings.usual * count))]
+    return float(left[usual].mean() / max(moves[usual].mean(), 1e-30))
 
 
 def _sway(rest: np.ndarray) -> float:

@@ -13,7 +13,7 @@ from gsl.core.body import lump
 from gsl.core.plant import Plant
 from gsl.core.slides import in_metres, levers
 from gsl.diagnosis.log.records import Pieces, Record, group_alike
-from gsl.diagnosis.simulate.calibration import calibrate
+from gsl.diagnosis.simulate.calibration import HALF_STEP, calibrate
 from gsl.effects.effect import apply_all, build
 from gsl.worlds.engine import Engine
 from gsl.worlds.fits import fitting_step
@@ -56,8 +56,11 @@ class InTheAir:
 
     @property
     def log_step(self) -> float:
-        """Physics period of the logs of a self-test [s]: where replays are accurate another one, by another scheme."""
-        return fitting_step(0.5 * self.step, self.period) if self.accurate else self.step
+        """Physics period of the logs of a self-test [s]: where replays are accurate another one, by another scheme.
+
+        That scheme is half a step ahead of its commands: of a coarse one chance would gain as of a cause.
+        """
+        return fitting_step(min(0.5 * self.step, 2.0 * HALF_STEP), self.period) if self.accurate else self.step
 
     def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return the replayed positions [rad], shape (W, T, n_joints); NaN where a replay diverges."""

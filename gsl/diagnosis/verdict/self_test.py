@@ -114,7 +114,7 @@ def simulate_nulls(log: Log, problem: Problem, none: Hypothesis, options: Option
         gains = [base.cost - single.cost for single in singles]
         frees = [base.fit.prior_cost - single.fit.prior_cost for single in singles]
         freed = max(map(min, zip(gains, frees, strict=True)), default=0.0)
-        chances.append(Chance(max(gains, default=0.0), freed))
+        chances.append(Chance(max(gains, default=0.0), freed, base.level, float(base.levels.max())))
         problem.tick("")
     return chances
 

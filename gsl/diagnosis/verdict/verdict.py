@@ -81,6 +81,7 @@ class Judge:
 
     Attributes:
         expected: Cost of a residual where only noise is left.
+        worst: The same of the joint where most is left.
         margins: Spread of the difference of costs to a rival, by the rival's effect, as a self-test measured it.
         mistakes: Share of a self-test's logs of a rival, by the rival's effect, that the chosen one explains better.
         doubt: Share of a cost by which that of two causes differs by chance.
@@ -92,6 +93,7 @@ class Judge:
     """
 
     expected: float
+    worst: float = 1.0
     margins: Mapping[str, float] = field(default_factory=dict)
     mistakes: Mapping[str, float] = field(default_factory=dict)
     doubt: float = 0.0
@@ -113,7 +115,7 @@ class Judge:
         excess = max(none.cost - least, 1e-9)
         explained = float(np.clip((none.cost - chosen.cost) / excess, 0.0, 1.0))
         remaining = chosen.level / self.expected
-        worst_joint = chosen.levels.max() / max(1.0, self.expected)
+        worst_joint = chosen.levels.max() / max(self.worst, self.expected)
         strange = max(np.log(remaining) / np.log(how.foreign), np.log(worst_joint) / np.log(how.local))
         quiet = (
             max(chosen.level / self.noise_cost, chosen.levels.max())
