@@ -24,6 +24,7 @@ from gsl.real_robot.errand import REHEARSAL
 from gsl.runner import bridge
 from gsl.runner.journal import ANSWER, RETURNS, add_return, ends
 from gsl.runner.request import HELD, NAME, read_request
+from gsl.runner.senses import BODY, JOINTS
 from gsl.storage.requests import MODULES, files_of
 
 CACHE = "__pycache__"  # of a folder in which a runner was started; nothing in it is read
@@ -78,8 +79,8 @@ class Surrogate:
 
     def __init__(self, request: Mapping[str, Any], env: gymnasium.Env, layout: Layout, *, blind: bool) -> None:
         self._env, self._layout = env, layout
-        parts = [part for part in layout.sizes if not (blind and part in _BODY)]
-        self._parts = {part: layout[part] for part in parts}
+        taken = {*request["observes"], *BODY, *JOINTS} - ({*_BODY} if blind else set())
+        self._parts = {part: layout[part] for part in layout.sizes if part in taken}
         self._sizes = request["observes"]
         self._observation = np.zeros(layout.size)
         self._observation[layout["position"]] = request["episodes"][0]["posture"]

@@ -415,6 +415,16 @@ def test_a_rehearsal_that_cannot_be_is_refused_in_one_line(place: Path, words: t
     assert refused("rehearse", f"request={ASKED}", *words, folder=place, code=code).startswith(problem)
 
 
+def test_a_robot_that_is_asked_for_no_sensors_is_rehearsed_without(tmp_path: Path) -> None:
+    words = ("world=robot", "world.floating=false", "world.sensors=[]", "task=excite", "policy.motions=[steps_large]")
+    words = ("collect", *words, "policy.duration=1.5", "policy.repeats=1", "workers=1", "name=air")
+    request = _asked(*words, folder=tmp_path)
+    done("rehearse", f"request={request}", "world=nao_worn", "world.floating=false", folder=tmp_path)
+    done(*words, folder=tmp_path)
+    log = read(tmp_path / "runs/air/collect_real/trajectories.parquet")
+    assert not [name for name in log.episodes[0].sensors if name.startswith("gyro")]
+
+
 def test_a_rehearsal_runs_no_code_that_gsl_did_not_write(place: Path) -> None:
     (place / ASKED / "runner.py").write_text("import os\n")
     assert "is not what this gsl writes, and is not run here" in refused("rehearse", f"request={ASKED}", folder=place)
