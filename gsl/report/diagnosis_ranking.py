@@ -34,7 +34,7 @@ SHOWN = 12
 def causes(document: Document) -> Markup | None:
     """Return every fitted parameter of the causes as it stands in the corrected simulator."""
     rows = [row for cause in entries(document, "causes") for row in _parameters(cause)]
-    columns = ("cause", "parameter", "value", "95 % interval", "in the file", "sure", "of the rest, back without it")
+    columns = ("cause", "parameter", "value", "95 % interval", "in the file", "sure", "gap that returns without it")
     return section("The causes in numbers", table(columns, rows) if rows else None)
 
 

@@ -57,7 +57,7 @@ def _causes(document: Document) -> Table:
         alike += [("nearest", nearest(document))] if nearest(document) else []
         alike += [("missing" if k == 0 else "", line) for k, line in enumerate(list_missing(document))]
         return Table(headline(document), ("", ""), [*alike, *_shrinkage(document)], said)
-    columns = ("cause", "parameter", "value", "95 % interval", "probability", "of the rest, back without it")
+    columns = ("cause", "parameter", "value", "95 % interval", "probability", "gap that returns without it")
     more = [f"and {len(rows) - CAUSES} more, in the report"] if len(rows) > CAUSES else []
     lines = "\n".join([*more, *filter(None, [said]), *list_open_groups(document)])
     return Table(headline(document), columns, rows[:CAUSES], lines or None)
