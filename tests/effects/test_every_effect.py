@@ -215,7 +215,7 @@ def test_two_stictions_leave_their_mean_velocity_whichever_comes_first() -> None
         ({"ground_compliance": {"stiffness": 0.0}}, "effects.ground_compliance.stiffness.*above 0"),
         ({"uneven_ground": {"height": 0.01, "spacing": 0.0}}, "effects.uneven_ground.spacing.*at least 0.02"),
         ({"command_latency": {"delay": 0.15}}, None),
-        ({"command_latency": [{"delay": 0.15}] * 3}, "effects.command_latency.delay = 0.45: at most 0.3 s"),
+        ({"command_latency": [{"delay": 0.3}] * 9}, "effects.command_latency.delay = 2.7: at most 2.54 s"),
         ({"sensor_delay": {"delay": 0.512}}, None),
         ({"sensor_delay": {"delay": 0.513}}, "effects.sensor_delay.delay = 0.513: at most 0.512 s"),
     ],

@@ -224,7 +224,7 @@ def test_a_servo_far_from_its_log_or_worse_than_none_is_a_problem(air: tuple[Pat
     ]
     assert problems({**none, "floors_after": 1.2}) == []
     assert "of other motions it says nothing" in problems({**metrics, "whole_motions": False})[0]
-    assert "servos remember 25 ms of commands at the log's rate" in remarks({**metrics, "period": 0.0002})[0]
+    assert "servos remember 25.4 ms of commands at the log's rate" in remarks({**metrics, "period": 0.0002})[0]
     assert remarks({**metrics, "period": 0.005}) == remarks(metrics)
     far = {"legs": {"floors_before": 9.0, "floors_after": 3.4, "learned": True}}
     assert "legs are 3.4 noise floors from the log, more than 3" in remarks({**metrics, "groups": far})[-1]
