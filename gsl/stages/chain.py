@@ -45,6 +45,11 @@ class Budget:
         check_tolerated(self.tolerated, self.check)
 
     @property
+    def screened(self) -> int:
+        """Simulated episodes of a winner before the robot tries it; none where falls are tolerated."""
+        return 0 if self.tolerated else self.screening
+
+    @property
     def real(self) -> tuple[int, int]:
         """Real episodes of the policy and of its neighbours that models learn from."""
         return self.real_episodes, self.real_neighbours

@@ -166,7 +166,7 @@ class Chain(Links):
             grounding=grounding,
             optimizer=self.optimizer,
             rollouts=self.budget.rollouts,
-            screening=0 if self.budget.tolerated else self.budget.screening,  # falls are no reason there
+            screening=self.budget.screened,
             objective=self.objective,
             quantile=self.quantile,
             initial=previous,

@@ -222,6 +222,19 @@ def ring(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
     position[:, 0] += 0.1 * np.exp(-since / 6.0) * np.cos(0.5 * since)
 
 
+def test_a_refusal_names_the_angle_that_is_beyond_the_limits() -> None:
+    low = NAO.joint("LKneePitch").lower - 3.0
+    at = list(NAO.controlled).index("LKneePitch")
+
+    def beyond(episode: Trajectory) -> Trajectory:
+        position = episode.position.copy()
+        position[7, at], position[8, at] = low, abs(low) + 0.1  # the second is larger, and less far beyond
+        return replace(episode, position=position)
+
+    with pytest.raises(GslError, match=rf"position.LKneePitch reaches {low:.3g}, beyond"):
+        check_log(changed(log(), beyond), NAO, "log")
+
+
 @pytest.mark.parametrize("parallel", [True, False])
 def test_a_joint_that_its_neighbour_takes_along_does_not_shake(parallel: bool) -> None:
     """One joint moves at a time, and gravity and inertia bend the servo of the other."""

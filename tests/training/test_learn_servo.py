@@ -14,7 +14,7 @@ from gsl.diagnosis.log.log import Log, cut_log
 from gsl.diagnosis.log.records import slope
 from gsl.effects.effect import apply_all, build
 from gsl.errors import ConfigError, InputError
-from gsl.models.servo import ServoModel, neutral, with_group, without_group
+from gsl.models.servo import ServoModel, neutral, units, with_group, without_group
 from gsl.robots.go2 import go2
 from gsl.robots.pendulum import pendulum
 from gsl.training.learn_servo import LearnedServo, document, learn_servo
@@ -228,6 +228,12 @@ def test_each_condition_is_left_out_in_turn() -> None:
     last = leave_out(labelled, split(labelled, labelled=False))[2]
     assert last.judge.size
     assert not np.isin(exp.pieces.record[last.judge], exp.pieces.record[last.test]).any()
+
+
+def test_numbers_of_a_servo_that_torques_alone_drive_have_units() -> None:
+    none = np.zeros(1)
+    bare = nominal(ROBOT).with_servo(kp=none, kd=none, armature=none)
+    assert all((values > 0.0).all() and np.isfinite(values).all() for values in units(bare).values())
 
 
 def test_repeats_of_a_motion_are_on_one_side() -> None:

@@ -260,8 +260,6 @@ def _self_test(findings: Findings) -> dict[str, Any] | None:
         key = (" + ".join(trial.truth) or "no effect", " + ".join(trial.answer) or "no effect")
         counts[key] = counts.get(key, 0) + 1
     confusions = [{"truth": truth, "answer": answer, "count": count} for (truth, answer), count in counts.items()]
-    cases, gain = (
-        len(findings.chances) + len(findings.trials),
-        max((done.gain for done in findings.chances), default=None),
-    )
+    cases = len(findings.chances) + len(findings.trials)
+    gain = max((chance.gain for chance in findings.chances), default=None)
     return {"cases": cases, "null_gain": gain, "confusions": confusions}
