@@ -34,8 +34,6 @@ class Replays:
     threads: int
     pool: Executor = field(repr=False, compare=False)
     model: ServoModel | None = None
-    calibrates = False
-    spread = 1.0
 
     @property
     def joints(self) -> int:
@@ -60,16 +58,6 @@ class Replays:
             ]
             result[index] = np.concatenate(list(self.pool.map(held.replay, windows)))[..., : self.joints]
         return result
-
-    @property
-    def accurate(self) -> bool:
-        """Replays are those of the world that the servo goes to."""
-        return False
-
-    @property
-    def log_step(self) -> float:
-        """Physics period of logs that a self-test makes [s]."""
-        return self.step
 
     def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return what the fixed servo replays, as a simulator without effects of its own does."""

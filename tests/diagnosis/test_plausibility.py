@@ -142,5 +142,7 @@ def test_what_is_dropped_leaves_the_others_within_their_ranges() -> None:
     )
     nothing = replace(both, candidates=(), parameters=(), costs=np.full(8, 500.0))
     fits = {load.candidates[0].effect: load, beyond.candidates[0].effect: beyond}
-    problem = SimpleNamespace(settings=SearchSettings(), fit=lambda candidates, *_: fits[candidates[0].effect])
+    problem = SimpleNamespace(
+        settings=SearchSettings(), fit_all=lambda asks: [fits[ask.candidates[0].effect] for ask in asks]
+    )
     assert Search(cast(Any, problem), nothing).prune(both) is load

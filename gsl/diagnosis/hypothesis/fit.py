@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from gsl.diagnosis.hypothesis.common_mode import Share, hand_over
+from gsl.diagnosis.hypothesis.normal import Normal
 from gsl.diagnosis.log.residual import loss, weight
 from gsl.diagnosis.settings import FitSettings
 from gsl.diagnosis.simulate.calibration import PROBES, SPREADS, ZERO, clip_shifts, no_shifts, prior_cost, prior_costs
@@ -86,8 +87,7 @@ def fit_proportional(
     for _ in range(REWEIGHTINGS):
         best, _ = fit_shifts(z + np.einsum("a,awsj->wsj", theta, own), slopes, at, spread)
         left = z + np.einsum("a,awsj->wsj", theta, own) + np.einsum("awsj,aj->wsj", slopes, best - at)
-        matrix, right = _normal(left, own, slopes, best, spread)
-        theta = theta + np.linalg.solve(matrix, right)[: len(own)]
+        theta = theta + Normal.of(left, own, slopes, best, spread).solve()[0]
     return theta
 
 
@@ -146,13 +146,13 @@ class Descent:
     def fit(self, start: np.ndarray, at: np.ndarray) -> Fit:
         """Descend from parameters, shape (p,), and shifts, shape (7, n_joints)."""
         first = np.clip(start, *self.bounds)
-        here, matrix = self._descend(self._relieve(self._point(first, at)))
+        here, normal = self._descend(self._relieve(self._point(first, at)))
         poor = here.cost > self.settings.poor * here.z.size
         if len(first) and (poor or self.bench.comparison.shaking.any()):
             there, other = self._descend(self._search(here.theta))
-            here, matrix = (there, other) if there.cost < here.cost else (here, matrix)
+            here, normal = (there, other) if there.cost < here.cost else (here, normal)
         scale = self._scale(here.theta)
-        covariance = np.linalg.inv(matrix)[: len(first), : len(first)] * np.outer(scale, scale)
+        covariance = normal.covariance * np.outer(scale, scale)
         return Fit(here.theta, here.shifts, here.cost, prior_cost(here.shifts, self._spread), covariance)
 
     @property
@@ -167,29 +167,29 @@ class Descent:
         """Return how much a parameter moves by a unit of its step, shape (p,)."""
         return np.where(self.ratios, theta, 1.0)
 
-    def _descend(self, here: _Point) -> tuple[_Point, np.ndarray]:
-        """Take Levenberg-Marquardt steps as long as they pay; return the last point and normal matrix."""
-        matrix, age = np.eye(len(here.theta) + here.shifts.size), self.every
+    def _descend(self, here: _Point) -> tuple[_Point, Normal]:
+        """Take Levenberg-Marquardt steps as long as they pay; return the last point and its normal equations."""
+        age = self.every
         for _ in range(self.rounds):
             if age == self.every:
                 slopes, age = sensitivities(self.bench, self.build(here.theta), here.shifts, here.z), 0
             own = self._own_slopes(here) * self._scale(here.theta)[:, None, None, None]
-            matrix, right = _normal(here.z, own, slopes, here.shifts, self._spread)
-            before, here = here, self._relieve(self._step(here, matrix, right))
+            normal = Normal.of(here.z, own, slopes, here.shifts, self._spread)
+            before, here = here, self._relieve(self._step(here, normal))
             if before.cost - here.cost < self.settings.enough * before.cost:
                 if age == 0:
                     break
                 age = self.every - 1
             age += 1
-        return here, matrix
+        return here, normal
 
-    def _step(self, here: _Point, matrix: np.ndarray, right: np.ndarray) -> _Point:
+    def _step(self, here: _Point, normal: Normal) -> _Point:
         """Return the first of the damped steps that descends well, else the best, each joint damped as suits it."""
-        p, points, most = len(here.theta), [here], self.settings.parts
+        points, most = [here], self.settings.parts
         for damping in self.settings.dampings:
-            step = np.linalg.solve(matrix + damping * np.diag(np.diag(matrix)), right)
-            moved = np.where(self.ratios, here.theta * np.exp(np.clip(step[:p], -most, most)), here.theta + step[:p])
-            shifts = clip_shifts(here.shifts + step[p:].reshape(here.shifts.shape))
+            step, shift = normal.solve(damping)
+            moved = np.where(self.ratios, here.theta * np.exp(np.clip(step, -most, most)), here.theta + step)
+            shifts = clip_shifts(here.shifts + shift)
             points.append(self._point(np.clip(moved, *self.bounds), shifts))
             if points[-1].cost < (1.0 - self.settings.well) * here.cost:
                 return min(points, key=_cost)
@@ -240,27 +240,3 @@ class Descent:
 
 def _cost(here: _Point) -> float:
     return here.cost
-
-
-def _normal(
-    z: np.ndarray, own: np.ndarray, slopes: np.ndarray, shifts: np.ndarray, spread: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return the normal equations of (parameters, shifts), of shapes (p + 7 n, p + 7 n) and (p + 7 n,)."""
-    p, joints = len(own), z.shape[2]
-    w, size = weight(z), p + shifts.size
-    matrix, right = np.zeros((size, size)), np.zeros(size)
-    weighted = own * w
-    matrix[:p, :p] = np.einsum("awsj,bwsj->ab", weighted, own)
-    right[:p] = -np.einsum("awsj,wsj->a", weighted, z)
-    cross = np.einsum("awsj,bwsj->abj", weighted, slopes).reshape(p, shifts.size)
-    matrix[:p, p:], matrix[p:, :p] = cross, cross.T
-    blocks = np.einsum("awsj,wsj,bwsj->abj", slopes, w, slopes, optimize=True)
-    for a in range(len(slopes)):
-        for b in range(len(slopes)):
-            at_a, at_b = p + a * joints + np.arange(joints), p + b * joints + np.arange(joints)
-            matrix[at_a, at_b] = blocks[a, b]
-    precision = np.repeat(1.0 / (spread * SPREADS) ** 2, joints)
-    matrix[range(p, size), range(p, size)] += precision
-    matrix[range(p), range(p)] += 1e-9 * np.abs(np.diag(matrix)[:p]) + 1e-12
-    right[p:] = -np.einsum("awsj,wsj->aj", slopes, w * z).ravel() - precision * shifts.ravel()
-    return matrix, right

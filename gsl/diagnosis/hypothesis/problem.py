@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,6 +29,30 @@ from gsl.worlds.servo_state import COMMANDS
 
 LATENCY, PUSH = "command_latency", "external_push"
 IN_CONTACT = "contact"  # kind of effects that a robot in the air cannot show
+
+
+class Ask(NamedTuple):
+    """A fit that is asked for.
+
+    Attributes:
+        candidates: The effects.
+        start: Their parameters in one row.
+        at: Shifts to begin with, shape (7, n_joints).
+        every: Steps for which sensitivities to the shifts are kept.
+        rounds: Steps at most.
+    """
+
+    candidates: tuple[Candidate, ...]
+    start: np.ndarray
+    at: np.ndarray
+    every: int | None = None
+    rounds: int | None = None
+
+    @property
+    def key(self) -> tuple[Any, ...]:
+        """By which what came of it is remembered."""
+        names = (part.key for part in self.candidates)
+        return (*names, self.start.tobytes(), self.at.tobytes(), self.every, self.rounds)
 
 
 @dataclass(frozen=True)
@@ -141,31 +165,27 @@ class Problem:
         every: int | None = None,
         rounds: int | None = None,
     ) -> Hypothesis:
-        """Fit a set of effects and score it.
+        """Fit a set of effects and score it; arguments as those of `Ask`."""
+        return self.fit_all([Ask(candidates, start, at, every, rounds)])[0]
 
-        Args:
-            candidates: The effects.
-            start: Their parameters in one row.
-            at: Shifts to begin with, shape (7, n_joints).
-            every: Steps for which sensitivities to the shifts are kept.
-            rounds: Steps at most.
-        """
-        asked = (*(part.key for part in candidates), start.tobytes(), at.tobytes(), every, rounds)
-        if asked not in self.memory:
-            self.memory[asked] = self._fit(candidates, start, at, every, rounds)
-        else:
+    def fit_all(self, asks: Sequence[Ask]) -> list[Hypothesis]:
+        """Fit sets of effects side by side, each from a start of its own, and score them."""
+        new = {ask.key: ask for ask in asks if ask.key not in self.memory}
+        fits = self.simulator.side_by_side(lambda simulator, ask: self.on(simulator)._fit(ask), [*new.values()])
+        for key, fit in zip(new, fits, strict=True):
+            self.memory[key] = fit
             self.tick("")
-        fit: Hypothesis = self.memory[asked]
-        return fit
+        for _ in range(len(asks) - len(new)):
+            self.tick("")
+        return [self.memory[ask.key] for ask in asks]
 
-    def _fit(
-        self,
-        candidates: tuple[Candidate, ...],
-        start: np.ndarray,
-        at: np.ndarray,
-        every: int | None,
-        rounds: int | None,
-    ) -> Hypothesis:
+    def on(self, simulator: Simulator) -> Problem:
+        """Return the problem on another simulator of the same replays."""
+        train, held_out = (replace(bench, simulator=simulator) for bench in (self.train, self.held_out))
+        return replace(self, train=train, held_out=held_out)
+
+    def _fit(self, ask: Ask) -> Hypothesis:
+        candidates, start, at, every, rounds = ask
         sizes = np.cumsum([len(candidate.free) for candidate in candidates])[:-1]
 
         def split(values: np.ndarray) -> tuple[np.ndarray, ...]:
@@ -192,7 +212,6 @@ class Problem:
         cost = lost.sum(axis=1)
         costs = np.array([cost[sample == name].sum() for name in samples])
         counts = np.array([used.sum() * (sample == name).sum() for name in samples])
-        self.tick("")
         return Hypothesis(candidates, parameters, fit, costs, counts, self.held_out.comparison.levels(lost))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -20,16 +20,14 @@ from gsl.errors import InputError
 
 
 @dataclass(frozen=True)
-class Log:
-    """Trajectories of one robot in windows.
+class Cut:
+    """A log in windows, of which a part is held out.
 
     Attributes:
         robot: Whose log it is.
         records: Its trajectories.
         repeats: Which motion each of them is of.
         pieces: All windows.
-        noise: The noise floor.
-        comparison: How replays are compared with it.
         train: Windows for fitting, shape (n_train,).
         held_out: Windows for checking, shape (n_held_out,).
         period: Control period [s].
@@ -43,15 +41,13 @@ class Log:
     records: tuple[Record, ...]
     repeats: tuple[Repeat, ...]
     pieces: Pieces
-    noise: NoiseFloor
-    comparison: Comparison
     train: np.ndarray
     held_out: np.ndarray
     period: float
     by_record: bool
-    order: tuple[int, ...] = ()
-    made_at: float | None = None
-    settings: LogSettings = field(default_factory=LogSettings)
+    order: tuple[int, ...]
+    made_at: float | None
+    settings: LogSettings
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -72,6 +68,19 @@ class Log:
     def channels(self) -> tuple[str, ...]:
         """Names of what is compared: the joints, and the base if it moves."""
         return (*self.joints, *BASE) if self.walking else self.joints
+
+
+@dataclass(frozen=True)
+class Log(Cut):
+    """A log in windows, with what counts as noise in it.
+
+    Attributes:
+        noise: The noise floor.
+        comparison: How replays are compared with it.
+    """
+
+    noise: NoiseFloor
+    comparison: Comparison
 
     @property
     def train_pieces(self) -> Pieces:
@@ -115,6 +124,25 @@ def cut_log(
     blocks: bool = False,
     settings: LogSettings | None = None,
 ) -> Log:
+    """Cut a batch into windows as `cut` does, and measure its noise."""
+    part = cut(batch, robot, walking=walking, held_out=held_out, blocks=blocks, settings=settings)
+    how, joints = part.settings, np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
+    least = np.r_[joints, list(how.base_floor)] if walking else None
+    asked = label_indices([record.about for record in part.records], held_out or {})
+    noise = noise_floor(part.records, part.repeats, part.period, robot.encoder_step, least, asked, how.floor)
+    comparison = Comparison.plain(noise.sd) if walking else compare(part.pieces, noise, len(joints), how.floor)
+    return Log(**{each.name: getattr(part, each.name) for each in fields(part)}, noise=noise, comparison=comparison)
+
+
+def cut(
+    batch: Batch,
+    robot: Robot,
+    *,
+    walking: bool = False,
+    held_out: Mapping[str, Any] | None = None,
+    blocks: bool = False,
+    settings: LogSettings | None = None,
+) -> Cut:
     """Cut a batch into windows and part it; the order of its trajectories changes nothing.
 
     Args:
@@ -140,18 +168,10 @@ def cut_log(
     pieces = cut_pieces(records, robot, period, warm_up=warm_up, scored=scored)
     if walking:
         pieces = pieces.take(spread(np.arange(len(pieces)), how.walk_windows))
-        joints = np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
-        noise = noise_floor(
-            records, repeats, period, robot.encoder_step, np.r_[joints, list(how.base_floor)], asked, how.floor
-        )
-        comparison = Comparison.plain(noise.sd)
-    else:
-        noise = noise_floor(records, repeats, period, robot.encoder_step, held=asked, settings=how.floor)
-        comparison = compare(pieces, noise, len(robot.controlled), how.floor)
     held, by_record = _hold_out(records, repeats, pieces, asked, how.block * scored if blocks else 0)
     train, check = np.flatnonzero(~held), np.flatnonzero(held)
     made_at = _read_step(batch)
-    return Log(robot, records, repeats, pieces, noise, comparison, train, check, period, by_record, order, made_at, how)
+    return Cut(robot, records, repeats, pieces, train, check, period, by_record, order, made_at, how)
 
 
 def _read_step(batch: Batch) -> float | None:

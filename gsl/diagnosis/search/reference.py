@@ -10,7 +10,7 @@ import numpy as np
 
 from gsl.core.plant import Plant
 from gsl.diagnosis.hypothesis.hypothesis import by_cost
-from gsl.diagnosis.hypothesis.problem import LATENCY, Problem
+from gsl.diagnosis.hypothesis.problem import LATENCY, Ask, Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.options import Options
 from gsl.diagnosis.search.selection import Thresholds
@@ -71,5 +71,5 @@ def clock_shift(log: Log, nominal: Nominal, options: Options, tick: Callable[[st
     problem = nominal.problem(log, replace(options, clocks=True, without=()), tick)
     candidate = next(part for part in problem.library if part.effect == LATENCY)
     still = no_shifts(problem.train.joints)
-    fits = [problem.fit((candidate,), np.array([start]), still) for start in options.search.clock_starts]
+    fits = problem.fit_all([Ask((candidate,), np.array([start]), still) for start in options.search.clock_starts])
     return float(min(fits, key=by_cost).parameters[0][0])

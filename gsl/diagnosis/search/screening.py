@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,11 +12,11 @@ from gsl.diagnosis.hypothesis.candidates import Candidate
 from gsl.diagnosis.hypothesis.common_mode import hand_over, shares
 from gsl.diagnosis.hypothesis.fit import fit_proportional, fit_shifts, sensitivities
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
-from gsl.diagnosis.hypothesis.problem import Problem
+from gsl.diagnosis.hypothesis.problem import Ask, Problem
 from gsl.diagnosis.settings import SearchSettings
 from gsl.diagnosis.simulate.calibration import no_shifts, prior_cost
 from gsl.diagnosis.simulate.in_the_air import Effects
-from gsl.diagnosis.simulate.simulator import Bench
+from gsl.diagnosis.simulate.simulator import Bench, Simulator
 
 
 @dataclass(frozen=True)
@@ -96,6 +96,10 @@ class Ground:
         best, costs = fit_shifts(z, slopes, at, bench.simulator.spread)
         return cls(bench, effects, at, z, slopes, costs, best)
 
+    def on(self, simulator: Simulator) -> Ground:
+        """Return it on another simulator of the same replays."""
+        return replace(self, bench=replace(self.bench, simulator=simulator))
+
     def suspects(self, scopes: Mapping[str, np.ndarray], settings: SearchSettings) -> list[str]:
         """Return the joints in which most of what calibration leaves lies: there every effect is tried alone."""
         used = self.bench.comparison.count_residuals(self.residual.shape[1]) * len(self.residual)
@@ -120,7 +124,7 @@ def extend(problem: Problem, base: Hypothesis, width: int) -> tuple[list[Hypothe
     """Return hypotheses with one effect more than `base`, best first, and the screening that led to them."""
     screening = screen(problem, base)
     new = [lead for lead in screening.leads if (lead.candidate.effect, lead.candidate.scope) not in base.places]
-    fits = [_fit_lead(problem, base, lead) for lead in _best_leads(new, width, problem.settings.again)]
+    fits = _fit_leads(problem, base, _best_leads(new, width, problem.settings.again))
     fits += _free_shifts(problem, base, [fit.places for fit in fits])
     return sorted(fits, key=by_cost), screening
 
@@ -148,17 +152,20 @@ def _free_shifts(problem: Problem, base: Hypothesis, tried: Sequence[frozenset[t
     return [problem.fit((*base.candidates, candidate), np.r_[base.start, theta], left)]
 
 
-def _fit_lead(problem: Problem, base: Hypothesis, lead: Lead) -> Hypothesis:
-    """Fit one effect more from where the screening saw it, and from hardly any of it in what stands.
+def _fit_leads(problem: Problem, base: Hypothesis, leads: Sequence[Lead]) -> list[Hypothesis]:
+    """Fit one effect more, each from where the screening saw it and from hardly any of it in what stands.
 
     The screening gives each joint the calibration that suits the effect alone. Beside other effects a descent from
     there can end in another valley, above what already stands.
     """
-    candidates, neutral = (*base.candidates, lead.candidate), lead.candidate.neutral
-    hardly = neutral + problem.settings.hardly * (lead.parameters - neutral)
-    starts = [(lead.parameters, lead.shifts), *([(hardly, base.fit.shifts)] if base.candidates else [])]
-    fits = [problem.fit(candidates, np.r_[base.start, values], shifts) for values, shifts in starts]
-    return min(fits, key=lambda hypothesis: hypothesis.fit.cost)
+    asks = []
+    for lead in leads:
+        candidates, neutral = (*base.candidates, lead.candidate), lead.candidate.neutral
+        hardly = neutral + problem.settings.hardly * (lead.parameters - neutral)
+        starts = [(lead.parameters, lead.shifts), *([(hardly, base.fit.shifts)] if base.candidates else [])]
+        asks += [Ask(candidates, np.r_[base.start, values], shifts) for values, shifts in starts]
+    fits, each = problem.fit_all(asks), 2 if base.candidates else 1
+    return [min(fits[k : k + each], key=lambda hypothesis: hypothesis.fit.cost) for k in range(0, len(fits), each)]
 
 
 def screen_candidates(
@@ -179,16 +186,20 @@ def screen_candidates(
         settings: What counts as invisible.
         seen: Answers of candidates by their keys; new ones are put in.
     """
-    seen = {} if seen is None else seen
+    seen, candidates = {} if seen is None else seen, list(candidates)
+    new = [part for part in {part.key: part for part in candidates}.values() if part.key not in seen]
+    answers = ground.bench.simulator.side_by_side(lambda simulator, part: _answer(ground.on(simulator), part), new)
+    for candidate, answer in zip(new, answers, strict=True):
+        seen[candidate.key] = answer
+        tick("")
     leads: list[Lead] = []
     traces: dict[str, float] = {}
     for candidate in candidates:
-        if candidate.key not in seen:
-            seen[candidate.key] = _answer(ground, candidate)
         grid, costs, shifts, trace = seen[candidate.key]
         traces[candidate.effect] = max(trace, traces.get(candidate.effect, 0.0))
         if trace > 0.0:
             leads += _leads(candidate, grid, costs, shifts, ground, scopes)
+    for _ in range(len(candidates) - len(new)):
         tick("")
     leads.sort(key=lambda lead: lead.cost)
     invisible = sorted(name for name, trace in traces.items() if trace <= settings.invisible)

@@ -9,7 +9,7 @@ import numpy as np
 
 from gsl.diagnosis.hypothesis.common_mode import shares
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
-from gsl.diagnosis.hypothesis.problem import Problem
+from gsl.diagnosis.hypothesis.problem import Ask, Problem
 from gsl.diagnosis.search.exempt import list_exemptions
 from gsl.diagnosis.search.screening import extend, screen
 from gsl.diagnosis.search.selection import Selection, Thresholds, stands
@@ -110,10 +110,11 @@ class Search:
         """Return what an effect has to gain over calibration alone."""
         return max(self.thresholds.gain, self.thresholds.share * self.none.cost)
 
-    def _fit(self, chosen: Hypothesis, kept: list[int]) -> Hypothesis:
-        """Fit some of the effects of a hypothesis anew from where they are."""
+    def _without(self, chosen: Hypothesis, dropped: int) -> Ask:
+        """Return the fit of the other effects of a hypothesis from where they are."""
+        kept = [k for k in range(chosen.size) if k != dropped]
         start = np.concatenate([chosen.parameters[k] for k in kept])
-        return self.problem.fit(tuple(chosen.candidates[k] for k in kept), start, chosen.fit.shifts)
+        return Ask(tuple(chosen.candidates[k] for k in kept), start, chosen.fit.shifts)
 
     def _grow(self, singles: list[Hypothesis]) -> Hypothesis:
         """Add one effect after the other to the best single one as long as more is left than noise."""
@@ -178,7 +179,7 @@ class Search:
     def prune(self, chosen: Hypothesis) -> Hypothesis:
         """Drop effects that the others can do without, within their documented ranges if that is possible."""
         while chosen.size > 1:
-            fewer = [self.drop(chosen, k) for k in range(chosen.size)]
+            fewer = self.problem.fit_all([self._without(chosen, k) for k in range(chosen.size)])
             self.tried += fewer
             named = chosen.claims_its_names
             best = min(fewer, key=lambda fit: (named and not fit.claims_its_names, fit.cost))
@@ -189,7 +190,7 @@ class Search:
 
     def drop(self, chosen: Hypothesis, k: int) -> Hypothesis:
         """Return a hypothesis without its k-th effect, fitted anew."""
-        return self._fit(chosen, [index for index in range(chosen.size) if index != k])
+        return self.problem.fit_all([self._without(chosen, k)])[0]
 
     def exempt(self, chosen: Hypothesis) -> Hypothesis:
         """Take joints out of causes of many joints, where the calibration undoes what these do."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -24,6 +24,8 @@ from gsl.worlds.start import resting
 
 Effects = Mapping[str, Any]
 """A world's `effects:` mapping."""
+Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 def change(plant: Plant, effects: Effects, shifts: np.ndarray | None = None) -> Plant:
@@ -73,8 +75,19 @@ class InTheAir:
             result[index] = self._replay(change(plant, conditions), windows)[..., :joints]
         return result
 
+    def side_by_side(self, work: Callable[[Any, Item], Result], items: Sequence[Item]) -> Iterator[Result]:
+        """Yield what some work makes of each item, as many at once as there are threads; a lone item has them all."""
+        if self.threads == 1 or len(items) < 2:
+            yield from (work(self, item) for item in items)
+            return
+        alone = replace(self, threads=1)
+        with ThreadPoolExecutor(self.threads) as pool:
+            yield from pool.map(lambda item: work(alone, item), items)
+
     def _replay(self, plant: Plant, windows: Any) -> np.ndarray:
         held = Held.of(plant, self.step, self.period, self.accurate)
+        if self.threads == 1:
+            return held.replay(windows)
         slices = shares(len(windows.clock), self.threads)
         parts = [Windows(*(part[share] for part in windows)) for share in slices]
         result = np.empty((len(windows.clock), windows.length, len(plant.robot.motors)))

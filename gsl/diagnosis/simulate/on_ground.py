@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pickle
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,7 +15,7 @@ from gsl.core.console import Silent
 from gsl.core.plant import GRAVITY, Plant
 from gsl.diagnosis.log.records import OnGround, Pieces
 from gsl.diagnosis.simulate.calibration import ZERO, calibrate, draw_shifts
-from gsl.diagnosis.simulate.in_the_air import Effects, change
+from gsl.diagnosis.simulate.in_the_air import Effects, Item, Result, change
 from gsl.rollout.parallel import in_parallel
 from gsl.worlds.engine import Engine
 from gsl.worlds.physics import Physics, Reading
@@ -60,6 +61,10 @@ class Walking:
             joints = len(plant.robot.controlled)
             channels[..., :joints] += shifts[ZERO, :joints]
         return channels
+
+    def side_by_side(self, work: Callable[[Any, Item], Result], items: Sequence[Item]) -> Iterator[Result]:
+        """Yield what some work makes of each item, one after the other: their replays are what is side by side."""
+        yield from (work(self, item) for item in items)
 
     def _replay(self, plant: Plant, windows: Any) -> np.ndarray:
         physics = Physics(self.step, self.iterations, self.period, floating=True)

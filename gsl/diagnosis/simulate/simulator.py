@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -14,7 +14,7 @@ from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.log import spread as spread_evenly
 from gsl.diagnosis.log.records import Pieces, Record, cut_pieces
 from gsl.diagnosis.log.residual import Comparison
-from gsl.diagnosis.simulate.in_the_air import Effects, InTheAir, change, replay_in_bullet
+from gsl.diagnosis.simulate.in_the_air import Effects, InTheAir, Item, Result, change, replay_in_bullet
 from gsl.diagnosis.simulate.on_ground import Walking
 from gsl.worlds.fits import fitting_step
 from gsl.worlds.held import Held
@@ -25,8 +25,19 @@ HALVINGS = 3  # of the step, at most: replays take as many times as long
 FINEST = 2.4e-4  # step [s]: encoders remember so many of half this size that a sensor delay of 30 ms is within
 
 
-class Simulator(Protocol):
-    """Something that replays windows.
+class Replayer(Protocol):
+    """Something that replays windows."""
+
+    @property
+    def period(self) -> float:
+        """Control period [s]."""
+
+    def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
+        """Return what would be logged, shape (W, T, n_channels); NaN where a replay diverges."""
+
+
+class Simulator(Replayer, Protocol):
+    """The simulator that a diagnosis asks.
 
     Attributes:
         calibrates: Whether all shifts are fitted in its replays; else zeros alone.
@@ -54,12 +65,8 @@ class Simulator(Protocol):
     def accurate(self) -> bool:
         """Whether errors of replays fall with the square of the step."""
 
-    @property
-    def period(self) -> float:
-        """Control period [s]."""
-
-    def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
-        """Return what would be logged, shape (W, T, n_channels); NaN where a replay diverges."""
+    def side_by_side(self, work: Callable[[Any, Item], Result], items: Sequence[Item]) -> Iterator[Result]:
+        """Yield what some work, with a simulator that may be its own, makes of each item."""
 
 
 def simulator_of(log: Log, plant: Plant, step: float, *, threads: int = 1, spread: float = 1.0) -> Simulator:
@@ -123,7 +130,7 @@ class Bench:
 
 
 def mean_errors(
-    simulator: Simulator, effects: Effects, shifts: np.ndarray, records: Sequence[Record], robot: Robot
+    simulator: Replayer, effects: Effects, shifts: np.ndarray, records: Sequence[Record], robot: Robot
 ) -> np.ndarray:
     """Return the mean absolute error of whole trajectories replayed open loop, shape (n_records, n_joints) [rad].
 

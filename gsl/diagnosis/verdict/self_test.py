@@ -14,7 +14,7 @@ import numpy as np
 
 from gsl.core.plant import Plant
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost, name_in_place
-from gsl.diagnosis.hypothesis.problem import Problem
+from gsl.diagnosis.hypothesis.problem import Ask, Problem
 from gsl.diagnosis.log.log import Log
 from gsl.diagnosis.log.records import Pieces, Record, cut_pieces, slope
 from gsl.diagnosis.options import Chance, Options
@@ -126,7 +126,7 @@ def duel(log: Log, problem: Problem, rivals: Sequence[Hypothesis], options: Opti
         for trial in range(options.duels):
             fake = repose(log, problem, truth, np.random.default_rng((options.seed, trial, 2, k)))
             still = no_shifts(fake.train.joints)
-            fits = [fake.fit(rival.candidates, rival.start, still) for rival in rivals]
+            fits = fake.fit_all([Ask(rival.candidates, rival.start, still) for rival in rivals])
             winner = min(fits, key=by_cost)
             costs, errors = tuple(fit.cost for fit in fits), fits[k].start - truth.start
             trials.append(Trial(truth.names, winner.names, costs, fits[k].level, errors))

@@ -14,12 +14,12 @@ from gsl.core.slides import levers
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.angles import with_log_in_angles
 from gsl.diagnosis.log.files import on_ground
-from gsl.diagnosis.log.log import spread
+from gsl.diagnosis.log.log import cut_log, spread
 from gsl.diagnosis.wiring.fault import Fault
 from gsl.diagnosis.wiring.options import by_relation, permutations
 from gsl.diagnosis.wiring.outcome import Wiring
 from gsl.diagnosis.wiring.physics import Fit
-from gsl.diagnosis.wiring.search import Search, cut_motions
+from gsl.diagnosis.wiring.search import WINDOWS, Search
 from gsl.diagnosis.wiring.speeds import find_speeds
 from gsl.diagnosis.wiring.words import Channels, describe, remedy
 from gsl.errors import GslError
@@ -131,7 +131,7 @@ def audit(batch: Batch, plant: Plant, step: float, tick: Callable[[], None]) -> 
         remarks.append("No joint is left to compare with the simulator.")
     else:
         try:
-            floor = cut_motions(mended, plant).noise.sd
+            floor = cut_log(mended, robot, blocks=True, settings=WINDOWS).noise.sd
             wiring = Search(take_part(mended), plant, step, floor, excluded, tick).run()
         except GslError as error:
             remarks.append(f"Nothing was replayed: {error}.")

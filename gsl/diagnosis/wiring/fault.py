@@ -47,6 +47,11 @@ class Fault:
     change: Callable[[Plant], Plant] = lambda plant: plant
     refloor: Change = lambda floor: floor
 
+    @property
+    def key(self) -> tuple[str, ...]:
+        """By which faults of one log are told apart."""
+        return self.kind, self.side, repr(self.joints), repr(self.value)
+
 
 def change_log(batch: Batch, *, action: Change | None = None, position: Change | None = None) -> Batch:
     """Return a log with other commands and positions, each a function of arrays of shape (T, n_joints)."""

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from gsl.core.plant import Plant
-from gsl.diagnosis.log.log import Log, spread
+from gsl.diagnosis.log.log import Cut, spread
 from gsl.diagnosis.log.records import Pieces
 from gsl.diagnosis.log.residual import loss, weight
 from gsl.effects.effect import list_documented
@@ -102,7 +102,7 @@ class Contest:
 
     plant: Plant
     step: float
-    log: Log
+    log: Cut
     floor: np.ndarray
     tick: Callable[[], None]
 

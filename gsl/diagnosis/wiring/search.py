@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.optimize import linear_sum_assignment
 
 from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch
-from gsl.diagnosis.log.log import Log, cut_log
+from gsl.diagnosis.log.log import Cut, cut
 from gsl.diagnosis.settings import FloorSettings, LogSettings, SearchSettings
 from gsl.diagnosis.wiring.fault import BOTH, Fault, gains, permute, rescale
 from gsl.diagnosis.wiring.options import Spread, by_range, by_relation, find_beyond, gain_grid, permutations, timings
@@ -45,11 +45,6 @@ LARGE = 4.0  # floors, below which friction of real servos, which is more than o
 LIKE_PHYSICS = ("rate", "hold", "gains")  # faults that friction or a soft servo resembles, unless motions differ
 
 
-def cut_motions(batch: Batch, plant: Plant) -> Log:
-    """Return a log in windows of which every second motion, or block of unnamed motions, is held out."""
-    return cut_log(batch, plant.robot, blocks=True, settings=WINDOWS)
-
-
 @dataclass(frozen=True)
 class Search:
     """A log under search.
@@ -69,6 +64,9 @@ class Search:
     floor: np.ndarray
     excluded: frozenset[int]
     tick: Callable[[], None]
+    _costs: dict[tuple[str, ...], np.ndarray | None] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def run(self) -> Wiring:
         """Return all faults that stand."""
@@ -91,8 +89,8 @@ class Search:
         return replace(self, batch=batch, plant=plant, floor=floor)
 
     @cached_property
-    def _log(self) -> Log:
-        return cut_motions(self.batch, self.plant)
+    def _log(self) -> Cut:
+        return cut(self.batch, self.plant.robot, blocks=True, settings=WINDOWS)
 
     def _contest(self, fault: Fault | None = None) -> Contest:
         mended = self._mend(fault) if fault else self
@@ -102,10 +100,12 @@ class Search:
         return Contest(mended.plant, self.step, log, mended.floor, self.tick)
 
     def _screen(self, fault: Fault) -> np.ndarray | None:
-        try:
-            return self._contest(fault).screen()
-        except GslError:  # a rate at which no episode is long enough
-            return None
+        if (name := fault.key) not in self._costs:
+            try:
+                self._costs[name] = self._contest(fault).screen()
+            except GslError:  # a rate at which no episode is long enough
+                self._costs[name] = None
+        return self._costs[name]
 
     def _round(self, fit: Fit) -> Stand | None:
         """Return the fault that explains most of what physics leaves, None where none stands."""
