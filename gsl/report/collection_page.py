@@ -16,13 +16,12 @@ from gsl.core.words import duration, falls, in_unit, several
 from gsl.report.charts import Curve, line_chart
 from gsl.report.footfalls import Walk
 from gsl.report.parts import choice, section, table
-from gsl.report.run_page import Answer, budget, describe_value, fold_long, footfalls, write_page
+from gsl.report.run_page import DRAWN, Answer, budget, describe_value, fold_long, footfalls, write_page
 from gsl.report.shown import Scale, scale_of
 
 _SIDES = {REAL: "on the real side", SIM: "in simulation"}
 _KINDS = {REAL: "real", SIM: "before"}  # of the line of a joint
 _STATE = Scale(1.0, "")
-DRAWN = 6  # of joints or entries of a state: a picture costs 70 ms
 
 
 def write_collection_page(

@@ -22,6 +22,7 @@ MARKS = {"good": "✓", "doubt": "?"}
 LONG = 12  # rows of a table that are shown at once
 _NOTHING = Markup("")
 PARAMETERS = 40  # of a policy that are listed, the most changed first
+DRAWN = 6  # joints, or entries of a state: a picture costs 70 ms
 
 
 class Answer(NamedTuple):
@@ -151,12 +152,13 @@ def curves(searches: Sequence[Search], unit: str) -> Markup | None:
 
 
 def joints(traces: Mapping[str, Traces], note: str, title: str = "Joint by joint") -> Markup | None:
-    """Return the section with the traces of each joint, of which the reader chooses one."""
+    """Return the section with the traces of the first joints, those that move most; the reader chooses one."""
     pictures = {
-        joint: svg(joint_trace_figure(traces, joint, title="", width=WIDTH), f"traces of {joint}")
-        for joint, traces in traces.items()
+        joint: svg(joint_trace_figure(traces[joint], joint, title="", width=WIDTH), f"traces of {joint}")
+        for joint in list(traces)[:DRAWN]
     }
-    return section(title, choice("joint", pictures), note=note)
+    some = f" The {DRAWN} that move most, of {len(traces)}." if len(traces) > DRAWN else ""
+    return section(title, choice("joint", pictures), note=note + some)
 
 
 def footfalls(walks: Sequence[Walk], note: str = "") -> Markup | None:
