@@ -62,7 +62,7 @@ class Options:
         most: Effects at once.
         duels: Simulated logs for each surviving cause; 0 tests nothing.
         nulls: Simulated logs without an effect.
-        threads: That replay side by side.
+        threads: That fit, screen and replay side by side.
         clocks: Whether commands and measurements have one clock; else latency is not claimed.
         spread: Of the robot's calibration about the simulator's, as a share of the usual spread of one make.
         seed: Of the simulated logs.

@@ -15,7 +15,18 @@ from gsl.report.iteration_page import grounding, read_check
 from gsl.report.joint_trace import Traces
 from gsl.report.learning_curve import search
 from gsl.report.parts import section, table
-from gsl.report.run_page import Answer, Change, budget, curves, describe_gain, footfalls, joints, parameters, write_page
+from gsl.report.run_page import (
+    Answer,
+    Change,
+    budget,
+    curves,
+    describe_gain,
+    footfalls,
+    joints,
+    parameters,
+    rank_joints,
+    write_page,
+)
 
 _CAPTION = "A fresh episode on the real side, the first with a fall if there was one."
 _REPLAYED = " Simulators start in one of its states and play its actions."
@@ -76,8 +87,8 @@ def write_evaluation_page(
 
 def _draw_joints(look: Look) -> Iterator[Markup | None]:
     """Yield a section a policy; simulators are there where the policies are of a search."""
-    order = list(next(iter(look.traces.values()), {}))  # whoever compares two policies looks at the same joint
+    order = rank_joints(*look.traces.values())  # whoever compares two policies looks at the same joint
     for name, own in look.traces.items():
-        traces = {joint: own[joint] for joint in dict.fromkeys(filter(own.__contains__, [*order, *own]))}
+        traces = {joint: own[joint] for joint in order if joint in own}
         replayed = any(trace.simulation is not None for trace in traces.values())
         yield joints(traces, _CAPTION + _REPLAYED * replayed, f"Joint by joint: {name}")

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from markupsafe import Markup
 
 from gsl.core.unit import Unit
@@ -151,13 +152,22 @@ def curves(searches: Sequence[Search], unit: str) -> Markup | None:
     return section("Learning curves", element("div", *drawn, kind="panels"), note=note)
 
 
+def rank_joints(*policies: Mapping[str, Traces]) -> list[str]:
+    """Return the joints by how far they move, the farthest first, whichever policy moves them."""
+    ranges: dict[str, float] = {}
+    for traces in policies:
+        for joint, trace in traces.items():
+            ranges[joint] = max(ranges.get(joint, 0.0), float(np.ptp(trace.real)))
+    return sorted(ranges, key=lambda joint: -ranges[joint])
+
+
 def joints(traces: Mapping[str, Traces], note: str, title: str = "Joint by joint") -> Markup | None:
-    """Return the section with the traces of the first joints, those that move most; the reader chooses one."""
+    """Return the section with the traces of the first joints of several; the reader chooses one."""
     pictures = {
         joint: svg(joint_trace_figure(traces[joint], joint, title="", width=WIDTH), f"traces of {joint}")
         for joint in list(traces)[:DRAWN]
     }
-    some = f" The {DRAWN} that move most, of {len(traces)}." if len(traces) > DRAWN else ""
+    some = f" Shown are {DRAWN} of {len(traces)} joints, those that move most." if len(traces) > DRAWN else ""
     return section(title, choice("joint", pictures), note=note + some)
 
 

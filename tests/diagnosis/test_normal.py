@@ -39,3 +39,28 @@ def test_a_parameter_that_changes_nothing_stays() -> None:
     z, slopes = np.ones((1, 2, 1)), np.ones((SHIFTS, 1, 2, 1))
     normal = Normal.of(z, np.zeros((1, *z.shape)), slopes, np.zeros((SHIFTS, 1)), spread=1.0)
     assert normal.solve()[0] == pytest.approx([0.0])
+
+
+def test_two_equal_effects_share_a_step_that_the_ridge_keeps_small() -> None:
+    rng = np.random.default_rng(0)
+    slopes = rng.normal(size=(SHIFTS, WINDOWS, SCORED, JOINTS)) / SPREADS[:, None, None, None]
+    alone = rng.normal(size=(1, WINDOWS, SCORED, JOINTS))
+    still = np.zeros((SHIFTS, JOINTS))
+    single, both = (Normal.of(-alone[0], own, slopes, still, 1.0) for own in (alone, np.concatenate([alone, alone])))
+    assert single.solve()[0] == pytest.approx([1.0], rel=1e-3)
+    assert both.solve()[0] == pytest.approx([0.5, 0.5], rel=1e-3)
+    unsure = np.sqrt(np.diag(both.covariance))
+    assert (unsure > 1e3 * np.sqrt(single.covariance[0, 0])).all() and np.isfinite(unsure).all()
+
+
+def test_a_joint_whose_replay_ran_away_leaves_the_others_alone() -> None:
+    rng = np.random.default_rng(0)
+    z, slopes = rng.normal(size=(WINDOWS, SCORED, JOINTS)), rng.normal(size=(SHIFTS, WINDOWS, SCORED, JOINTS))
+    far = z.copy()
+    far[..., 0] = 1e3
+    steps = [
+        Normal.of(each, np.zeros((0, *z.shape)), slopes, np.zeros((SHIFTS, JOINTS)), 1.0).solve()[1]
+        for each in (z, far)
+    ]
+    assert np.isfinite(steps[1]).all()
+    np.testing.assert_array_equal(steps[0][:, 1:], steps[1][:, 1:])

@@ -14,6 +14,7 @@ from gsl.core.plant import Plant, nominal
 from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.records import slope
 from gsl.diagnosis.wiring.audit import Audit, audit
+from gsl.diagnosis.wiring.options import gain_grid, timings
 from gsl.diagnosis.wiring.relation import relate
 from gsl.policies.excitation import Excitation
 from gsl.robots.nao import nao
@@ -135,3 +136,9 @@ def test_the_order_of_the_joints_in_the_log_changes_nothing() -> None:
     log = change(logged(), position=lambda x: x * [1.0, -1.0])
     turned = log.only(tuple(reversed(log.joints)))
     assert [finding["joints"] for finding in audited(turned).document()["findings"]] == [["elbow"]]
+
+
+def test_faults_of_one_search_have_keys_of_their_own() -> None:
+    faults = [*timings(range(2), 100), *gain_grid(range(2), nominal(arm()))]
+    assert len({fault.key for fault in faults}) == len(faults)
+    assert faults[0].key == next(iter(timings(range(2), 100))).key != next(iter(timings([0], 100))).key

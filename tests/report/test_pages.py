@@ -106,6 +106,18 @@ def test_two_policies_are_shown_at_the_same_joint_first(tmp_path: Path) -> None:
     assert "Learned servo: nearer." in words((tmp_path / "report.html").read_text("utf-8"))
 
 
+def test_of_many_joints_a_page_shows_those_that_any_policy_moves_most(tmp_path: Path) -> None:
+    def moving(ranges: dict[str, float]) -> dict[str, Traces]:
+        return {joint: trace(0.1)._replace(real=size * np.sin(TIME)) for joint, size in ranges.items()}
+
+    best = moving({f"j{k}": 1.0 - 0.1 * k for k in range(8)})
+    start = moving({f"j{k}": 0.01 for k in range(7)} | {"j7": 2.0})
+    page = Page(written(tmp_path, look=Look({"generation_01": best, "π0": start})))
+    shown = ["j7", "j0", "j1", "j2", "j3", "j4"]
+    assert [value for _, name, value in page.attributes if name == "data-of"] == shown * 2
+    assert "Shown are 6 of 8 joints" in words((tmp_path / "report.html").read_text("utf-8"))
+
+
 def test_feet_that_never_touch_the_ground_have_no_pattern() -> None:
     force = np.zeros(len(TIME))
     walk = cast(Any, SimpleNamespace(time=TIME, sensors={"foot_force.left": force}, ended_in_a_fall=False))

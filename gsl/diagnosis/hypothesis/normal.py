@@ -1,7 +1,7 @@
 """Normal equations of parameters, which all joints share, and of the calibration, which is each joint's own.
 
-Shifts of two joints never stand in one equation. So the joints are solved for one by one, and the parameters after
-them by the Schur complement: as exact as the whole matrix and a hundred times as quick.
+Shifts of two joints never stand in one equation, so each joint's are eliminated alone. What is left are the few
+equations of the parameters (Schur complement); a step of the shifts follows from theirs.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from gsl.diagnosis.log.residual import weight
 from gsl.diagnosis.simulate.calibration import SPREADS
 
-RIDGE, LEAST = 1e-9, 1e-12  # on parameters that change nothing: as a share of the largest, and alone
+RIDGE, LEAST = 1e-9, 1e-12  # on parameters that change nothing: as a share of their own, and alone
 
 
 @dataclass(frozen=True)
@@ -21,18 +21,18 @@ class Normal:
     """Normal equations of p parameters and of 7 shifts of each joint.
 
     Attributes:
-        own: Of the parameters, shape (p, p).
-        cross: Of parameters and shifts, shape (n_joints, 7, p).
-        shifts: Of each joint's shifts, shape (n_joints, 7, 7).
-        right: Right-hand side of the parameters, shape (p,).
-        below: Of the shifts, shape (n_joints, 7, 1).
+        of_parameters: Of the parameters, shape (p, p).
+        mixed: Of parameters and shifts, shape (n_joints, 7, p).
+        of_shifts: Of each joint's shifts, shape (n_joints, 7, 7).
+        right_of_parameters: Right-hand side of the parameters, shape (p,).
+        right_of_shifts: Of the shifts, shape (n_joints, 7, 1).
     """
 
-    own: np.ndarray
-    cross: np.ndarray
-    shifts: np.ndarray
-    right: np.ndarray
-    below: np.ndarray
+    of_parameters: np.ndarray
+    mixed: np.ndarray
+    of_shifts: np.ndarray
+    right_of_parameters: np.ndarray
+    right_of_shifts: np.ndarray
 
     @classmethod
     def of(cls, z: np.ndarray, own: np.ndarray, slopes: np.ndarray, at: np.ndarray, spread: float) -> Normal:
@@ -48,7 +48,7 @@ class Normal:
         w = weight(z)
         weighted, precision = own * w, 1.0 / (spread * SPREADS) ** 2
         matrix = np.einsum("awsj,bwsj->ab", weighted, own)
-        ridge = np.diag(RIDGE * np.abs(np.diag(matrix)) + LEAST)
+        ridge = np.diag(RIDGE * np.diag(matrix) + LEAST)
         blocks = np.einsum("awsj,wsj,bwsj->jab", slopes, w, slopes, optimize=True) + np.diag(precision)
         below = -np.einsum("awsj,wsj->ja", slopes, w * z) - precision * at.T
         return cls(
@@ -68,7 +68,7 @@ class Normal:
         answer = self._answer(damping)
         answers, alone = answer[..., :-1], answer[..., -1]
         schur = self._schur(answers, damping)
-        step = np.linalg.solve(schur, self.right - np.einsum("jap,ja->p", self.cross, alone))
+        step = np.linalg.solve(schur, self.right_of_parameters - np.einsum("jap,ja->p", self.mixed, alone))
         return step, (alone - answers @ step).T
 
     @property
@@ -78,9 +78,11 @@ class Normal:
 
     def _answer(self, damping: float) -> np.ndarray:
         """Return how the shifts answer to each parameter and, last, to the residuals, shape (n_joints, 7, p + 1)."""
-        diagonal = np.eye(self.shifts.shape[1]) * self.shifts
-        return np.linalg.solve(self.shifts + damping * diagonal, np.concatenate([self.cross, self.below], axis=2))
+        diagonal = np.eye(self.of_shifts.shape[1]) * self.of_shifts
+        return np.linalg.solve(
+            self.of_shifts + damping * diagonal, np.concatenate([self.mixed, self.right_of_shifts], axis=2)
+        )
 
     def _schur(self, answers: np.ndarray, damping: float) -> np.ndarray:
-        own = self.own + damping * np.diag(np.diag(self.own))
-        return np.asarray(own - np.einsum("jap,jaq->pq", self.cross, answers))
+        own = self.of_parameters + damping * np.diag(np.diag(self.of_parameters))
+        return np.asarray(own - np.einsum("jap,jaq->pq", self.mixed, answers))

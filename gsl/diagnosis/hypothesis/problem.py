@@ -51,8 +51,13 @@ class Ask(NamedTuple):
     @property
     def key(self) -> tuple[Any, ...]:
         """By which what came of it is remembered."""
-        names = (part.key for part in self.candidates)
-        return (*names, self.start.tobytes(), self.at.tobytes(), self.every, self.rounds)
+        return (
+            *(part.key for part in self.candidates),
+            self.start.tobytes(),
+            self.at.tobytes(),
+            self.every,
+            self.rounds,
+        )
 
 
 @dataclass(frozen=True)
@@ -171,12 +176,10 @@ class Problem:
     def fit_all(self, asks: Sequence[Ask]) -> list[Hypothesis]:
         """Fit sets of effects side by side, each from a start of its own, and score them."""
         new = {ask.key: ask for ask in asks if ask.key not in self.memory}
-        fits = self.simulator.side_by_side(lambda simulator, ask: self.on(simulator)._fit(ask), [*new.values()])
-        for key, fit in zip(new, fits, strict=True):
-            self.memory[key] = fit
-            self.tick("")
-        for _ in range(len(asks) - len(new)):
-            self.tick("")
+        fits = self.simulator.side_by_side(
+            lambda simulator, ask: self.on(simulator)._fit(ask), [*new.values()], lambda _: self.tick("")
+        )
+        self.memory.update(zip(new, fits, strict=True))
         return [self.memory[ask.key] for ask in asks]
 
     def on(self, simulator: Simulator) -> Problem:

@@ -182,16 +182,16 @@ def screen_candidates(
         ground: Where to start.
         candidates: Those on joints may have any scope; `all` is read out for every scope in `scopes`.
         scopes: Names of scopes and their joints, each of shape (n_joints,).
-        tick: Called with an empty word after each candidate.
+        tick: Called with an empty word after each candidate that is new.
         settings: What counts as invisible.
         seen: Answers of candidates by their keys; new ones are put in.
     """
     seen, candidates = {} if seen is None else seen, list(candidates)
     new = [part for part in {part.key: part for part in candidates}.values() if part.key not in seen]
-    answers = ground.bench.simulator.side_by_side(lambda simulator, part: _answer(ground.on(simulator), part), new)
-    for candidate, answer in zip(new, answers, strict=True):
-        seen[candidate.key] = answer
-        tick("")
+    answers = ground.bench.simulator.side_by_side(
+        lambda simulator, part: _answer(ground.on(simulator), part), new, lambda _: tick("")
+    )
+    seen.update(zip([part.key for part in new], answers, strict=True))
     leads: list[Lead] = []
     traces: dict[str, float] = {}
     for candidate in candidates:
@@ -199,8 +199,6 @@ def screen_candidates(
         traces[candidate.effect] = max(trace, traces.get(candidate.effect, 0.0))
         if trace > 0.0:
             leads += _leads(candidate, grid, costs, shifts, ground, scopes)
-    for _ in range(len(candidates) - len(new)):
-        tick("")
     leads.sort(key=lambda lead: lead.cost)
     invisible = sorted(name for name, trace in traces.items() if trace <= settings.invisible)
     return Screening(tuple(leads), tuple(invisible))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any, TypeVar
@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from gsl.core.body import lump
+from gsl.core.interruption import checkpoint
 from gsl.core.plant import Plant
 from gsl.core.slides import in_metres, levers
 from gsl.diagnosis.log.records import Pieces, Record, group_alike
@@ -42,7 +43,7 @@ class InTheAir:
         plant: The simulator as the user has it.
         step: Physics period [s].
         period: Control period [s].
-        threads: That replay side by side.
+        threads: That fit, screen and replay side by side.
         spread: Of the robot's calibration about this one, as a share of the usual spread of one make.
         accurate: Whether errors fall with the square of the step; if not, replays are those of Bullet at this step.
     """
@@ -66,6 +67,7 @@ class InTheAir:
 
     def simulate(self, effects: Effects, shifts: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return the replayed positions [rad], shape (W, T, n_joints); NaN where a replay diverges."""
+        checkpoint()  # threads hear of no Ctrl-C by themselves
         plant, joints = change(self.plant, effects, shifts), shifts.shape[1]
         if len(pieces.alike) == 1:
             return self._replay(change(plant, pieces.alike[0][0]), pieces.windows)[..., :joints]
@@ -75,14 +77,20 @@ class InTheAir:
             result[index] = self._replay(change(plant, conditions), windows)[..., :joints]
         return result
 
-    def side_by_side(self, work: Callable[[Any, Item], Result], items: Sequence[Item]) -> Iterator[Result]:
-        """Yield what some work makes of each item, as many at once as there are threads; a lone item has them all."""
-        if self.threads == 1 or len(items) < 2:
-            yield from (work(self, item) for item in items)
-            return
-        alone = replace(self, threads=1)
-        with ThreadPoolExecutor(self.threads) as pool:
-            yield from pool.map(lambda item: work(alone, item), items)
+    def side_by_side(
+        self, work: Callable[[Any, Item], Result], items: Sequence[Item], done: Callable[[Result], object]
+    ) -> list[Result]:
+        """Return what some work makes of each item, as many at once as there are threads; see `Simulator`."""
+        results, share = list[Result](), replace(self, threads=max(1, self.threads // max(1, len(items))))
+        with ThreadPoolExecutor(max(1, self.threads)) as pool:
+            try:
+                for result in pool.map(lambda item: work(share, item), items):
+                    results.append(result)
+                    done(result)
+            except BaseException:
+                pool.shutdown(cancel_futures=True)
+                raise
+        return results
 
     def _replay(self, plant: Plant, windows: Any) -> np.ndarray:
         held = Held.of(plant, self.step, self.period, self.accurate)

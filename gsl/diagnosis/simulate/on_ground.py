@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -62,9 +62,15 @@ class Walking:
             channels[..., :joints] += shifts[ZERO, :joints]
         return channels
 
-    def side_by_side(self, work: Callable[[Any, Item], Result], items: Sequence[Item]) -> Iterator[Result]:
-        """Yield what some work makes of each item, one after the other: their replays are what is side by side."""
-        yield from (work(self, item) for item in items)
+    def side_by_side(
+        self, work: Callable[[Any, Item], Result], items: Sequence[Item], done: Callable[[Result], object]
+    ) -> list[Result]:
+        """Return what some work makes of each item, one after the other: their replays are what is side by side."""
+        results = list[Result]()
+        for item in items:
+            results.append(work(self, item))
+            done(results[-1])
+        return results
 
     def _replay(self, plant: Plant, windows: Any) -> np.ndarray:
         physics = Physics(self.step, self.iterations, self.period, floating=True)

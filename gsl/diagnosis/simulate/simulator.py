@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -65,8 +65,17 @@ class Simulator(Replayer, Protocol):
     def accurate(self) -> bool:
         """Whether errors of replays fall with the square of the step."""
 
-    def side_by_side(self, work: Callable[[Any, Item], Result], items: Sequence[Item]) -> Iterator[Result]:
-        """Yield what some work, with a simulator that may be its own, makes of each item."""
+    def side_by_side(
+        self, work: Callable[[Any, Item], Result], items: Sequence[Item], done: Callable[[Result], object]
+    ) -> list[Result]:
+        """Return what some work makes of each item, in their order; their number and that of threads change no bit.
+
+        Args:
+            work: Gets a simulator, with fewer threads than this one, and an item; runs in any thread and keeps no
+                state.
+            items: Of the work.
+            done: Called with each result in turn, in the caller's thread; what it raises ends the work.
+        """
 
 
 def simulator_of(log: Log, plant: Plant, step: float, *, threads: int = 1, spread: float = 1.0) -> Simulator:
@@ -79,7 +88,7 @@ def simulator_of(log: Log, plant: Plant, step: float, *, threads: int = 1, sprea
         log: Whose commands.
         plant: The simulator as the user has it.
         step: Its physics period [s], at most.
-        threads: Threads or processes that replay side by side.
+        threads: That fit, screen and replay side by side; of a walk processes that replay.
         spread: Of the robot's calibration about this one, as a share of the usual spread of one make.
     """
     if log.walking:

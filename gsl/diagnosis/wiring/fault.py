@@ -49,7 +49,7 @@ class Fault:
 
     @property
     def key(self) -> tuple[str, ...]:
-        """By which faults of one log are told apart."""
+        """By which faults of one search are told apart: what mends them follows from it and the log."""
         return self.kind, self.side, repr(self.joints), repr(self.value)
 
 

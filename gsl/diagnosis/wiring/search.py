@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -85,12 +86,16 @@ class Search:
         return Wiring(tuple(stands), first, fit, search._rows_late(fit), doubted)
 
     def _mend(self, fault: Fault) -> Search:
-        batch, plant, floor = fault.mend(self.batch), fault.change(self.plant), fault.refloor(self.floor)
-        return replace(self, batch=batch, plant=plant, floor=floor)
+        batch, plant = fault.mend(self.batch), fault.change(self.plant)
+        return replace(self, batch=batch, plant=plant, floor=fault.refloor(self.floor))
 
     @cached_property
     def _log(self) -> Cut:
         return cut(self.batch, self.plant.robot, blocks=True, settings=WINDOWS)
+
+    @cached_property
+    def _base(self) -> np.ndarray:
+        return self._contest().screen()
 
     def _contest(self, fault: Fault | None = None) -> Contest:
         mended = self._mend(fault) if fault else self
@@ -100,21 +105,18 @@ class Search:
         return Contest(mended.plant, self.step, log, mended.floor, self.tick)
 
     def _screen(self, fault: Fault) -> np.ndarray | None:
-        if (name := fault.key) not in self._costs:
-            try:
-                self._costs[name] = self._contest(fault).screen()
-            except GslError:  # a rate at which no episode is long enough
-                self._costs[name] = None
-        return self._costs[name]
+        if fault.key not in self._costs:
+            with suppress(GslError):  # a rate at which no episode is long enough
+                self._costs[fault.key] = self._contest(fault).screen()
+        return self._costs.setdefault(fault.key, None)
 
     def _round(self, fit: Fit) -> Stand | None:
         """Return the fault that explains most of what physics leaves, None where none stands."""
         bad = [int(k) for k in np.flatnonzero((fit.rms > BAD) & (fit.angle > BAD_ANGLE)) if k not in self.excluded]
         if not bad:
             return None
-        base = self._contest().screen()
         for tier in (self._relations, self._others):  # what does not move as commanded spoils the rest
-            leads = sorted(tier(bad, base), key=lambda lead: -lead[0])[:LEADS]
+            leads = sorted(tier(bad, self._base), key=lambda lead: -lead[0])[:LEADS]
             tried = [(fault, self._contest(fault).fit()) for _, fault in leads]
             standing = [(fault, after) for fault, after in tried if _stands(fault, fit, after)]
             if standing := [pair for pair in standing if not self._is_physics(*pair)]:
@@ -162,7 +164,7 @@ class Search:
         off = np.flatnonzero(alone > NEEDED * NOISE_COST).tolist()
         if self.excluded or not off:
             return None
-        leads = sorted(self._others(off, contest.screen()), key=lambda lead: -lead[0])[:LEADS]
+        leads = sorted(self._others(off, self._base), key=lambda lead: -lead[0])[:LEADS]
         moving = np.ptp(np.concatenate([episode.action for episode in self.batch.episodes]), axis=0) > MOVES
         for _, lead in leads:
             own = [k for k in lead.joints if moving[k]] or list(lead.joints)
@@ -202,9 +204,8 @@ class Search:
     ) -> Iterator[tuple[float, Fault]]:
         for joints, spread in spreads:
             fault = spread.fault(joints)
-            if fault and (promising := self._promising(fault, joints, base)):
-                chosen = spread.fault(promising[1])
-                assert chosen is not None
+            promising = self._promising(fault, joints, base) if fault else None
+            if promising and (chosen := spread.fault(promising[1])):
                 yield promising[0], chosen
 
     def _others(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
@@ -251,8 +252,7 @@ class Search:
 
     def _both(self, bad: Sequence[int], base: np.ndarray) -> Iterator[tuple[float, Fault]]:
         """Yield axes that point the other way, and joints that have each other's names, in commands and positions."""
-        n = len(base)
-        minus, nothing = np.full(n, -1.0), np.zeros(n)
+        minus, nothing = np.full(len(base), -1.0), np.zeros(len(base))
         turned = {k: self._screen(rescale("sign", [k], BOTH, minus, nothing, {})) for k in bad}
         better = [k for k, cost in turned.items() if cost is not None and cost[k] < PROMISING * base[k]]
         if better:
