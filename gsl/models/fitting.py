@@ -13,7 +13,7 @@ from gsl.core.step_metrics import note_step
 from gsl.models.config import ModelConfig
 from gsl.models.free_run import Segments
 from gsl.models.head import POINT, Head
-from gsl.models.multi_step import MultiStep, answering, measure_travel
+from gsl.models.multi_step import MultiStep, answering, measure_travel, tensor
 from gsl.models.network import Network, Samples, unscale
 
 Loss = Callable[[torch.Tensor, torch.Tensor], torch.Tensor]
@@ -52,7 +52,7 @@ def _fit(
 ) -> Network:
     input_scaling, output_scaling = scaling(training[0]), scaling(training[1])
     seen, unseen = (
-        (_tensor(input_scaling.apply(x)), _tensor(output_scaling.apply(y))) for x, y in (training, validation)
+        (tensor(input_scaling.apply(x)), tensor(output_scaling.apply(y))) for x, y in (training, validation)
     )
     network = _network((training[0].shape[1], *config.hidden, head.width(training[1].shape[1])))
     loss = _surprise(head) if head.draws else torch.nn.functional.mse_loss
@@ -136,10 +136,6 @@ def _network(widths: tuple[int, ...]) -> torch.nn.Sequential:
     for wide, narrow in zip(widths[:-1], widths[1:], strict=True):
         layers += [torch.nn.Linear(wide, narrow), torch.nn.Tanh()]
     return torch.nn.Sequential(*layers[:-1])
-
-
-def _tensor(values: np.ndarray) -> torch.Tensor:
-    return torch.as_tensor(values, dtype=torch.float32)
 
 
 def _array(values: torch.Tensor) -> np.ndarray:

@@ -23,7 +23,7 @@ Answer = Callable[[torch.Tensor], torch.Tensor]
 def answering(network: torch.nn.Module, input_scaling: Scaling, output_scaling: Scaling) -> Answer:
     """Return what a network that takes and gives scaled values answers in plain ones."""
     (mean, sd), (shift, scale) = (
-        tuple(map(_tensor, (scaling.mean, scaling.sd))) for scaling in (input_scaling, output_scaling)
+        tuple(map(tensor, (scaling.mean, scaling.sd))) for scaling in (input_scaling, output_scaling)
     )
     return lambda windows: network((windows - mean) / sd) * scale + shift
 
@@ -44,9 +44,9 @@ class MultiStep:
     def __init__(self, pieces: Segments, scale: np.ndarray) -> None:
         shape = len(pieces.starts), pieces.history.span + pieces.ticks + 1
         columns = pieces.position, pieces.action, pieces.sensed
-        by_tick = [_tensor(column.reshape(*shape, column.shape[1]).swapaxes(0, 1)) for column in columns]
+        by_tick = [tensor(column.reshape(*shape, column.shape[1]).swapaxes(0, 1)) for column in columns]
         self._position, self._action, self._sensed = by_tick
-        self._history, self._scale = pieces.history, _tensor(scale)
+        self._history, self._scale = pieces.history, tensor(scale)
 
     def __len__(self) -> int:
         return self._position.shape[1]
@@ -63,5 +63,6 @@ class MultiStep:
         return (errors.square().mean(dim=(1, 2)) / self._scale).mean()
 
 
-def _tensor(values: np.ndarray) -> torch.Tensor:
+def tensor(values: np.ndarray) -> torch.Tensor:
+    """Return numbers as torch computes with them."""
     return torch.as_tensor(values, dtype=torch.float32)

@@ -131,7 +131,7 @@ class Excitation:
         most = getattr(bounds, kind.jump) if kind.jump else np.inf
         up, down = (self.amplitude * np.minimum(kind.share * room, most) for room in (bounds.up, bounds.down))
         way = wave * np.where(wave > 0.0, up, down)
-        return bounds.rest + (way if kind.jump else _slow_down(way, bounds.speed * period))
+        return bounds.rest + (way if kind.jump else slow_down(way, bounds.speed * period))
 
 
 def _piece(motion: Motion, variant: Variant) -> Piece:
@@ -139,7 +139,7 @@ def _piece(motion: Motion, variant: Variant) -> Piece:
     return Piece(f"{motion}_{variant}", np.array([float(number)]), {"motion": motion, "variant": variant})
 
 
-def _slow_down(way: np.ndarray, most: np.ndarray) -> np.ndarray:
+def slow_down(way: np.ndarray, most: np.ndarray) -> np.ndarray:
     """Return a way from rest, each joint's made smaller where one step of it is longer than `most` [rad]."""
     longest = np.abs(np.diff(way, axis=0, prepend=0.0)).max(axis=0)
     return way * (most / np.maximum(longest, most))

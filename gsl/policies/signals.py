@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -14,7 +14,6 @@ Signal = Literal[
     "position", "velocity", "last_action", "gyro", "gravity", "body_velocity", "foot_force",
     "base.position", "base.orientation", "base.velocity", "state", "constant", "phase",
 ]  # fmt: skip
-SIGNALS: tuple[Signal, ...] = get_args(Signal)
 OF_JOINTS = ("position", "velocity")
 AXES = ("x", "y", "z")
 UNITS: Mapping[str, str] = {

@@ -47,11 +47,6 @@ class Point(NamedTuple):
     falls: int
     later: int = 0
 
-    @property
-    def stable(self) -> bool:
-        """Whether it never fell."""
-        return not self.falls and not self.later
-
 
 class Search(NamedTuple):
     """One search for a policy, drawn as one panel.

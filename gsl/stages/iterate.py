@@ -158,11 +158,6 @@ class Iterate:
         return {**rounds.metrics(), SECTION: yielding.metrics() if yielding else None}
 
     @property
-    def learned(self) -> bool:
-        """Whether the grounding has models to train."""
-        return is_learned(self.grounding)
-
-    @property
     def chain(self) -> Chain:
         """The links of a round."""
         return Chain(

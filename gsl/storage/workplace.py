@@ -99,14 +99,6 @@ def workplace(out: Path, key: str, *, progress: str, kept: Collection[str] = ())
             shutil.rmtree(folder, ignore_errors=True)
 
 
-def destination(folder: Path) -> Path:
-    """Return where the artifact that is being built in a workplace will lie; any other folder is its own."""
-    name = folder.name
-    if not name.startswith("."):
-        return folder
-    return folder.with_name(name[1:].removesuffix(".partial").partition(".tmp-")[0])
-
-
 def _clear(folder: Path, kept: Collection[str]) -> None:
     """Remove what a kill left but the work does not go on from, so that it does not become part of the artifact.
 

@@ -9,7 +9,6 @@ from typing import Any
 SAME, FOREIGN = "same", "foreign"
 NULL, SINGLE, JOINT, TWO, WITHHELD, ABSENT = "null", "single", "joint", "two", "withheld", "absent"
 WALK = "walk"  # one effect, on the ground; all others are in the air
-KINDS = (NULL, SINGLE, JOINT, TWO, WITHHELD, ABSENT, WALK)
 KNOWN = (SINGLE, JOINT, TWO)  # kinds in the air whose causes are in the library
 
 
@@ -19,7 +18,7 @@ class Label:
 
     Attributes:
         case: Its name.
-        kind: One of KINDS.
+        kind: One of the words above.
         generator: `same` (gsl's chain model, or Bullet on the ground) or `foreign` (other servos in MuJoCo).
         strength: `none`, `weak`, `medium` or `strong`.
         gap: What the causes alone do, in floors: rms of what they change in the nominal simulator's replay, and noise.

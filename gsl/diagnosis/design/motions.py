@@ -13,7 +13,7 @@ import numpy as np
 
 from gsl.core.body import Robot
 from gsl.diagnosis.settings import DesignSettings
-from gsl.policies.excitation import MENU, VARIANTS, Excitation, Motion
+from gsl.policies.excitation import MENU, VARIANTS, Excitation, Motion, slow_down
 from gsl.policies.limits import Limits, limits
 from gsl.policies.sides import pairs
 
@@ -98,13 +98,7 @@ def to_the_ends(bounds: Limits, body: Robot, period: float, *, back: bool = Fals
         for k in (leader, *(right for right, left in partner.items() if left == leader)):
             side = end * signs.get(k, 1.0)
             way[begin : begin + length, k] = side * (bounds.up[k] if side > 0.0 else bounds.down[k]) * bump
-    return bounds.rest + _slow(way, bounds.speed * period)
-
-
-def _slow(way: np.ndarray, most: np.ndarray) -> np.ndarray:
-    """Return a way whose joints go less far where a step of theirs is longer than `most` [rad]."""
-    longest = np.abs(np.diff(way, axis=0, prepend=0.0)).max(axis=0)
-    return way * (most / np.maximum(longest, most))
+    return bounds.rest + slow_down(way, bounds.speed * period)
 
 
 def ladder(

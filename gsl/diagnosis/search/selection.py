@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gsl.diagnosis.hypothesis.hypothesis import Gain, Hypothesis, gain
+from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, gain
 from gsl.diagnosis.options import Chance
 from gsl.diagnosis.search.screening import Screening
 from gsl.diagnosis.settings import SearchSettings
@@ -61,11 +61,6 @@ class Selection:
     def rivals(self) -> tuple[Hypothesis, ...]:
         """All that may stand in the chosen one's place, best first."""
         return tuple(fit for fit in self.tried if not any(fit is other for other in self.rejected))
-
-    @property
-    def gain(self) -> Gain:
-        """Of the chosen hypothesis over calibration alone."""
-        return gain(self.chosen, self.none)
 
     def objection(self, hypothesis: Hypothesis) -> str | None:
         """Return what speaks against a hypothesis that costs less than the chosen one, None if it costs no less."""

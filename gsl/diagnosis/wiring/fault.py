@@ -12,16 +12,6 @@ from gsl.core.plant import Plant
 from gsl.core.trajectory import Batch, Trajectory
 
 ACTION, POSITION, BOTH = "action", "position", "both"
-MATTERS = {
-    "permuted": "joints are exchanged",
-    "sign": "a sign is missing",
-    "scale": "a unit or a scale is missing",
-    "offset": "an offset is missing, such as that of a default pose",
-    "gains": "the simulator's gains are others",
-    "rate": "the rate of the log is another",
-    "hold": "the robot takes only some of the commands",
-    "shift": "commands and positions are rows apart",
-}
 Change = Callable[[np.ndarray], np.ndarray]
 
 
@@ -30,7 +20,7 @@ class Fault:
     """A hypothesis that needs no physics.
 
     Attributes:
-        kind: One of `MATTERS`.
+        kind: `permuted`, `sign`, `scale`, `offset`, `gains`, `rate`, `hold` or `shift`.
         joints: Indices of the joints that it is about.
         side: What of the log is wrong: `action`, `position`, `both`, or empty where it is neither.
         value: Its numbers, by name.

@@ -26,15 +26,13 @@ class Relation(NamedTuple):
         likeness: Correlation with that command, with its sign, at the lag of the highest; 0 where it rests.
         factor: Spread of the position over that of the command, with the sign.
         offset: Mean of the position less that of the command [as logged].
-        spreads: Standard deviations of command and position, shape (2, n_joints).
-        means: Of the same, shape (2, n_joints).
+        means: Of command and position, shape (2, n_joints).
     """
 
     source: np.ndarray
     likeness: np.ndarray
     factor: np.ndarray
     offset: np.ndarray
-    spreads: np.ndarray
     means: np.ndarray
 
 
@@ -54,7 +52,7 @@ def relate(episodes: Sequence[Trajectory], period: float) -> Relation:
     means = np.array([action[:, source].mean(axis=0), position.mean(axis=0)])
     likeness = best[own, source]
     factor = np.sign(likeness) * spreads[1] / np.where(spreads[0] > 0.0, spreads[0], np.inf)
-    return Relation(source, likeness, factor, means[1] - means[0], spreads, means)
+    return Relation(source, likeness, factor, means[1] - means[0], means)
 
 
 def _stack(episodes: Sequence[Trajectory], lag: int) -> tuple[np.ndarray, np.ndarray]:

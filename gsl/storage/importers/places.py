@@ -15,6 +15,7 @@ from gsl.storage import manifest
 from gsl.storage.importers.formats import ENDS, HDF5, is_bag, is_npy_folder, readable, stem
 from gsl.storage.importers.hdf5_arrays import list_groups
 from gsl.storage.lerobot.dataset import Entry
+from gsl.storage.origin import relative
 from gsl.version import PACKAGE
 
 HOME = PACKAGE.parent
@@ -74,7 +75,7 @@ def _places(source: str, files: str | Mapping[str, str] | None, records: str) ->
     chosen = sorted({file for path in paths for file in _within(path, files)})
     if not chosen:
         raise InputError(_nothing(source, paths, files))
-    return [place for path in chosen for place in _apart(Place(stem(_relative(path, base)), {"": path}), records)]
+    return [place for path in chosen for place in _apart(Place(stem(relative(path, base)), {"": path}), records)]
 
 
 def _nothing(source: str, paths: list[Path], pattern: str | None) -> str:
@@ -151,7 +152,7 @@ def _folders(source: str, paths: list[Path], files: Mapping[str, str]) -> list[P
 def _several(base: Path, folder: Path, files: Mapping[str, str]) -> list[Place]:
     """Return the episode of a folder, or several whose files go together by what `*` stands for in their names."""
     fitting = {role: sorted(folder.glob(pattern)) for role, pattern in files.items()}
-    name = _relative(folder, base)
+    name = relative(folder, base)
     name = name if name != "." else folder.resolve().name
     if all(len(own) == 1 for own in fitting.values()):
         return [Place(name, {role: own[0] for role, own in fitting.items()})]
@@ -174,10 +175,6 @@ def _star(name: str, pattern: str) -> str:
     """Return what the * of a pattern stands for in a name."""
     before, after = pattern.split("*")
     return name[len(before) : len(name) - len(after)]
-
-
-def _relative(path: Path, base: Path) -> str:
-    return Path(os.path.relpath(path, base)).as_posix()
 
 
 def fields_of(name: str, pattern: str) -> dict[str, str]:
