@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 HEIGHT, ROW = 3.0, 0.27  # of curves, and of a row of bars or dots [in]
+SIDE, DIGIT, BELOW, END = 0.36, 0.093, 0.5, 0.2  # room left of and below axes, of each digit, and at the end [in]
+ABOVE, LINE, COLUMNS = 0.08, 0.19, 2  # room above a legend and for each of its rows [in], and its columns
 POINTS = 300  # of a line, at most
 LABEL = 30  # letters in a line of a row's label
 
@@ -75,6 +77,7 @@ def line_chart(
         return None
     with look():
         whole = figure(HEIGHT, WIDTH)
+        whole.set_layout_engine(None)  # to ask all words for their size takes longer than all the rest
         axes = whole.subplots()
         labels: dict[str, Any] = {}
         for curve, points in drawn:
@@ -86,9 +89,12 @@ def line_chart(
         axes.locator_params(axis="x", integer=counted)
         _name(axes, x, y)
         names = [name for name in reversed(labels) if name]
+        left, top = _make_room(axes, -(-len(names) // COLUMNS))
+        handles = [labels[name] for name in names]
         whole.legend(
-            [labels[name] for name in names], names, loc="outside upper left", ncols=2, frameon=False, fontsize=9.5
-        )
+            handles, names, loc="lower left", bbox_to_anchor=(left, top), ncols=COLUMNS, frameon=False, fontsize=9.5,
+            borderaxespad=0.2, borderpad=0.0,
+        )  # fmt: skip
     return svg(whole, "curves")
 
 
@@ -218,6 +224,15 @@ def scatter(pairs: Sequence[Pair], legend: Mapping[str, str], *, x: str, y: str)
         handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
         whole.legend(handles.values(), handles, loc="outside upper left", ncols=2, frameon=False, fontsize=9.5)
     return svg(whole, "pairs of values")
+
+
+def _make_room(axes: Axes, rows: int) -> tuple[float, float]:
+    """Place axes between their labels and a legend of so many rows; return its left and top edge, as shares."""
+    ticks = axes.yaxis.get_major_formatter().format_ticks(list(axes.get_yticks()))
+    left = (SIDE + DIGIT * max(map(len, ticks), default=0)) / WIDTH
+    low, top = BELOW / HEIGHT, 1.0 - (ABOVE + LINE * rows) / HEIGHT
+    axes.set_position((left, low, 1.0 - END / WIDTH - left, top - low))
+    return left, top
 
 
 def _name(axes: Axes, x: str, y: str) -> None:
