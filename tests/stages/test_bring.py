@@ -6,7 +6,6 @@ import json
 import runpy
 import sys
 import zipfile
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -114,13 +113,10 @@ def test_the_two_files_of_an_actor_do_the_same(home: Path) -> None:
     assert values[0] == pytest.approx(values[1], rel=1e-4)
 
 
-def test_seeds_are_a_row_each(
-    home: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_seeds_are_a_row_each(home: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "examples").symlink_to(ROOT / "examples")
     for name in ("mine_1", "better_1"):  # what is there is not trained
         (tmp_path / f"{name}.zip").write_bytes((home / "mine.zip").read_bytes())
-    monkeypatch.setattr(gsl, "run", partial(gsl.run, preset="toy", workers=1))
     script("examples/bring/seeds.py", "1", folder=tmp_path)
     row = capsys.readouterr().out.splitlines()[-1]
     seed, plain, came, better = (float(value) for value in row.strip("| ").split("|"))
