@@ -392,7 +392,7 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
 
 
 def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
-    few = (*FEW, "recipe.forward=linear")
+    few = (*FEW, "recipe.forward=linear", "iterate.task.duration=0.8", "iterate.budget.sim_episodes=2")
     with open_hydra(None):
         study = prepare(resolve(compose("reproduce_budget", ["preset=toy", "budgets=[4,6]"])))[0]
     cells = [("none", 0), ("gat", 4), ("sgat", 4), ("gat", 6), ("sgat", 6)]
