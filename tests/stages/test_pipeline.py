@@ -22,7 +22,7 @@ from gsl.storage.policy_choice import find_search
 pytestmark = pytest.mark.slow
 
 NAMED = (*SMALL, "name=chain")
-FEW = ("optimizer.candidates=4", "budget.rollouts=1", "recipe.forward=linear")
+FEW = ("optimizer.candidates=4", "optimizer.generations=1", "budget.rollouts=1", "recipe.forward=linear")
 WHOLE = ("iterate", *SMALL, *FEW, "grounding=gat", "name=whole", "accept=true", "beside=true")
 STAGES = ("collect_real", "collect_sim", "train_forward", "train_inverse", "optimize", "evaluate")
 
