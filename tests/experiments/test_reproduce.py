@@ -37,12 +37,11 @@ pytestmark = pytest.mark.slow
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
 KEPT = {  # what a study needs to run as itself; groundings have tests of their own
-    "table2": ("none", "gat_multi_step"),
+    "table2": ("none", "ane_02"),
     "table2-paper": ("none",),
-    "table3": ("gat",),
+    "table3": ("none",),
     "table4": ("sgat",),
     "linear-walk": ("none",),
-    "fig5": ("none", "gat_005"),
     "worlds": ("none",),
     "motion": ("none",),
 }
@@ -61,8 +60,11 @@ OFFERED = {
     "worlds": ("none", "ane_02", "gat_residual_01", "effects"),
     "motion": ("none", "ane_02", "gat", "gat_005", "gat_residual_01", "sgat"),
 }
-FEW = ("preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4")
-SHORT = ("iterate.budget.episodes=2", "iterate.optimizer.generations=1", "iterate.task.duration=1.2")
+FEW = (
+    "preset=toy", "iterate.workers=1", "iterate.optimizer.candidates=4", "iterate.optimizer.generations=1",
+    "iterate.task.duration=1.2", "iterate.budget.rollouts=1", "iterate.budget.episodes=1", "iterate.budget.check=1",
+    "iterate.budget.confirmation=2",
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("what", KEPT)
@@ -71,11 +73,10 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
     left_out += ["~worlds.nao_weak"] if what == "table2" else []
     left_out += ["~worlds.nao_harsh", "~worlds.nao_drawn_b"] if what == "worlds" else []
     left_out += ["rank=false"] if what in ("worlds", "motion") else []  # table 2 ranks
-    left_out += ["iterate.iterations=1"] if what == "table3" else []
-    left_out += ["recipe.forward=linear"] if what in ("table3", "table4") else []  # no choice of a family
+    left_out += ["iterate.iterations=1", "+grounding@methods.none=none"] if what == "table3" else []
+    left_out += ["recipe.forward=linear"] if what == "table4" else []  # no choice of a family
     left_out += ["iterate.aggregate=true", "iterate.budget.check=2"] if what == "table4" else []
-    left_out += ["iterate.forward_model.epochs=5"] if what == "table2" else []
-    said = done("reproduce", what, *FEW, *SHORT, *left_out, folder=tmp_path)
+    said = done("reproduce", what, *FEW, *left_out, folder=tmp_path)
     assert " for all of its results; a study that was stopped goes on where it was" in said.err
     folder = next((tmp_path / "runs").glob("*/reproduce"))
     trials = json.loads((folder / "trials.json").read_text())
@@ -105,8 +106,10 @@ def test_a_table_is_one_command(what: str, tmp_path: Path) -> None:
 
 def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) -> None:
     left_out = ("~methods.gat", "~methods.gat_005", "~methods.sgat", "~methods.effects")
-    few = (*FEW, *left_out, "iterate.task.duration=1.2", "iterate.optimizer.generations=1")
+    few = (*FEW, *left_out)
     done("reproduce", "fig5", *few, folder=tmp_path)
+    table = (tmp_path / "runs/fig5/reproduce/table.md").read_text()
+    assert "| none " in table and "| ane_02 " in table and "Sizes: preset=toy, but" in table
     first = tmp_path / "runs/fig5/trials.json"
     rows = json.loads(first.read_text())
     assert [row["number"] for row in rows] == [1, 1]
@@ -127,9 +130,10 @@ def test_a_study_goes_on_from_trials_that_were_made_elsewhere(tmp_path: Path) ->
     second = "first=2", "trials=1", "name=second", "known=runs/on/reproduce/trials.json"
     assert "2 of this study's 2 results are in" in done("reproduce", "fig5", *few, *second, folder=tmp_path).err
     assert json.loads((tmp_path / "runs/second/reproduce/trials.json").read_text()) == again[2:]
-    done("reproduce", "fig5", *few, "first=2", "trials=1", "name=alone", folder=tmp_path)  # run, and not known
+    one_method = "first=2", "trials=1", "name=alone", "~methods.ane_02"
+    done("reproduce", "fig5", *few, *one_method, folder=tmp_path)  # run, and not known
     alone = json.loads((tmp_path / "runs/alone/reproduce/trials.json").read_text())
-    assert [{**row, "made_by": ""} for row in alone] == [{**row, "made_by": ""} for row in again[2:]]
+    assert [{**row, "made_by": ""} for row in alone] == [{**again[2], "made_by": ""}]
     assert " 1 trial (2). " in (tmp_path / "runs/second/reproduce/table.md").read_text()
 
 
@@ -388,7 +392,7 @@ def test_replays_without_a_search_are_one_command(tmp_path: Path) -> None:
 
 
 def test_the_curve_over_budgets_is_one_command(tmp_path: Path) -> None:
-    few = (*FEW, "iterate.optimizer.generations=1", "iterate.task.duration=1.2", "recipe.forward=linear")
+    few = (*FEW, "recipe.forward=linear", "iterate.task.duration=0.8", "iterate.budget.sim_episodes=2")
     with open_hydra(None):
         study = prepare(resolve(compose("reproduce_budget", ["preset=toy", "budgets=[4,6]"])))[0]
     cells = [("none", 0), ("gat", 4), ("sgat", 4), ("gat", 6), ("sgat", 6)]

@@ -8,7 +8,8 @@ from typing import Any
 
 import pytest
 import yaml
-from commands import SMALL, Said, done
+from chains import read_iterate, search
+from commands import Said, done
 
 from gsl.core.console import Silent
 from gsl.core.setting import settings_of
@@ -27,9 +28,9 @@ from gsl.worlds.bullet import BulletWorld
 pytestmark = pytest.mark.slow
 
 LATE = ("real=nao_ideal", "real.effects.command_latency.delay=0.02")
-LINE = ("iterate", *SMALL, *LATE, "name=air", "accept=true")
+SHORT = ("preset=toy", "task.duration=1.2", "workers=1", "optimizer.generations=1", "optimizer.candidates=4")
+LINE = ("iterate", *SHORT, *LATE, "name=air", "accept=true")
 FIRST = "runs/air/iteration_01"
-OTHERS = sorted({*names()} - {"command_latency", "coulomb_friction"})  # left out where `air` has diagnosed with all
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +89,7 @@ def test_the_world_file_and_the_grounding_are_one_simulator_and_the_terminal_say
     output = done("show", "air/iteration_01/diagnose", folder=folder).out
     chosen = ("--config-dir", f"{FIRST}/diagnose", "world=diagnosed")
     assert f"gsl optimize {' '.join(chosen)} grounding=none" in output
-    line = ("optimize", *SMALL, "optimizer.generations=1")
+    line = ("optimize", *SHORT)
     done(*line, "name=file", *chosen, "grounding=none", folder=folder)
     done(*line, "name=grounded", "grounding=effects", f"grounding.diagnosis={FIRST}/diagnose", folder=folder)
     first, second = (read_policies(folder / f"runs/{name}/optimize/policies.json") for name in ("file", "grounded"))
@@ -107,22 +108,6 @@ def test_the_next_experiment_can_be_played_and_has_a_repeat(air: tuple[Path, Sai
     assert file in done("show", "air/iteration_01/diagnose", folder=folder).out
 
 
-def test_compare_sets_effects_beside_the_others(tmp_path: Path) -> None:
-    left = ("none", "ane_01", "ane_02", "gat", "gat_005")
-    chosen = [f"~methods.{name}" for name in left] + ["~worlds.nao_weak", "trials=1", "preset=toy"]
-    small = ("iterate.task.duration=1.2", "iterate.workers=1", "worlds.nao_worn.effects={command_latency:{delay:0.02}}")
-    few = (f"iterate.diagnosis.without={OTHERS}", "recipe.forward=linear", "iterate.optimizer.generations=1")
-    few += ("iterate.optimizer.candidates=4",)
-    done("compare", *chosen, *small, *few, "name=c", folder=tmp_path)
-    trials = {trial["method"]: trial for trial in loaded(tmp_path / "runs/c/compare/trials.json")}
-    assert list(trials) == ["effects", "effects_gat"]
-    home = tmp_path / "runs/c/nao_worn"
-    for method, learned in {"effects": 0, "effects_gat": 6}.items():
-        measured = loaded(home / method / "trial_01/evaluate/metrics.json")["real_episodes"]
-        assert trials[method]["real_episodes"] == measured + 5 + learned
-    assert {path.name for path in (home / "diagnosis/trial_01").iterdir()} == {"collect_excitation", "diagnose"}
-
-
 def test_identification_fits_the_same_log_without_a_verdict(air: tuple[Path, Said]) -> None:
     folder, _ = air
     said = done(*LINE, "grounding=identified", "out=runs/air/identified", folder=folder)
@@ -135,11 +120,12 @@ def test_identification_fits_the_same_log_without_a_verdict(air: tuple[Path, Sai
 
 def test_what_a_plan_leaves_out_is_no_candidate(tmp_path: Path) -> None:
     played = Excitation("nao", motions=("steps_large",), duration=1.5)
-    plan = DiagnosisPlan(played, duels=0, nulls=0, evaluations=16, without=("command_latency",))
+    left_out = tuple(sorted({*names()} - {"coulomb_friction"}))
+    plan = DiagnosisPlan(played, duels=0, nulls=0, evaluations=16, without=left_out)
     world = BulletWorld("nao", {})  # without a gap nothing is searched
     for method in ("diagnose", "identify"):
         made = plan.carry_out(world, world, method, tmp_path, workers=1, seed=1, console=Silent())
-        assert (made.manifest.kind, made.config["without"]) == (method, ["command_latency"])
+        assert (made.manifest.kind, made.config["without"]) == (method, [*left_out])
 
 
 @pytest.mark.parametrize("stage", [Diagnose, Identify, CrossValidate, DiagnosisPlan])
@@ -159,14 +145,13 @@ def test_an_identification_that_finds_nothing_better_leaves_the_simulator_as_it_
     assert document["shrinkage"]["after"] == pytest.approx(document["shrinkage"]["before"], rel=1e-6)
 
 
-@pytest.mark.parametrize(("grounding", "predicts"), [("sgat", "mixture"), ("gat_gated", "point"), ("randomised", "")])
-def test_every_other_grounding_goes_through_an_iteration(grounding: str, predicts: str, tmp_path: Path) -> None:
-    chosen = [f"grounding={grounding}", *(["grounding.predicts=mixture"] if predicts == "mixture" else [])]
-    few = ("forward_model.epochs=5", "task.duration=1.2", "optimizer.generations=1", "optimizer.candidates=4")
-    said = done(*LINE[:-2], f"name={grounding}", "accept=true", *chosen, *few, folder=tmp_path)
-    assert "real data: " in said.out
-    optimized = loaded(tmp_path / f"runs/{grounding}/iteration_01/optimize/metrics.json")
-    assert ("width" if grounding == "randomised" else "alpha") in optimized
-    if grounding != "randomised":
-        trained = loaded(tmp_path / f"runs/{grounding}/iteration_01/train_forward/config.yaml")["model"]
-        assert (trained["likelihood"], trained["members"]) == (predicts, 5 if grounding == "gat_gated" else 1)
+@pytest.mark.parametrize(
+    ("more", "decides"), [(("sgat", "grounding.predicts=mixture"), "alpha"), (("randomised",), "width")]
+)
+def test_every_other_grounding_goes_through_a_search(more: tuple[str, ...], decides: str, tmp_path: Path) -> None:
+    name, *settings = more
+    words = (*SHORT, *LATE, "accept=true", f"grounding={name}", *settings, "forward_model.epochs=5")
+    assert decides in search(read_iterate(*words), tmp_path).metrics
+    if settings:
+        trained = loaded(tmp_path / "train_forward/config.yaml")["model"]
+        assert (trained["likelihood"], trained["members"]) == ("mixture", 1)
