@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,6 +14,7 @@ pytestmark = pytest.mark.slow
 PLOT = Path(__file__).parents[2]
 ROOMS = ("gsl", "experiments", "benchmarks", "tests", "examples")
 FILLERS = {"one", "found", "told", "known", "given"}
+WORD = re.compile(rf"\b({'|'.join(FILLERS)})\b")
 IRREGULAR = {
     *("begun", "built", "chosen", "done", "drawn", "driven", "felt", "foreseen", "found", "given", "gone", "grown"),
     *("held", "hidden", "kept", "known", "laid", "lost", "made", "met", "paid", "rebuilt", "said", "seen", "sent"),
@@ -34,11 +36,14 @@ def files(*places: str) -> Iterator[Path]:
 
 def fillers(path: Path) -> list[str]:
     """Variables and parameters with a filler's name; fields of a class are settings, whose names others type."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
-    fields = {id(part.target) for node in ast.walk(tree) if isinstance(node, ast.ClassDef) for part in node.body
+    text = path.read_text(encoding="utf-8")
+    if not WORD.search(text):
+        return []
+    nodes = [*ast.walk(ast.parse(text))]
+    fields = {id(part.target) for node in nodes if isinstance(node, ast.ClassDef) for part in node.body
               if isinstance(part, ast.AnnAssign)}  # fmt: skip
-    bound = [node.arg for node in ast.walk(tree) if isinstance(node, ast.arg)]
-    bound += [node.id for node in ast.walk(tree)
+    bound = [node.arg for node in nodes if isinstance(node, ast.arg)]
+    bound += [node.id for node in nodes
               if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store) and id(node) not in fields]  # fmt: skip
     return [name for name in bound if name in FILLERS and (name_of(path), name) not in CONTRACT]
 
