@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -34,12 +35,16 @@ def files(*places: str) -> Iterator[Path]:
         yield from sorted((PLOT / place).rglob("*.py")) or [PLOT / place]
 
 
+@cache
+def look_through(path: Path) -> list[ast.AST]:
+    return [*ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
+
+
 def fillers(path: Path) -> list[str]:
     """Variables and parameters with a filler's name; fields of a class are settings, whose names others type."""
-    text = path.read_text(encoding="utf-8")
-    if not WORD.search(text):
+    if not WORD.search(path.read_text(encoding="utf-8")):
         return []
-    nodes = [*ast.walk(ast.parse(text))]
+    nodes = look_through(path)
     fields = {id(part.target) for node in nodes if isinstance(node, ast.ClassDef) for part in node.body
               if isinstance(part, ast.AnnAssign)}  # fmt: skip
     bound = [node.arg for node in nodes if isinstance(node, ast.arg)]
@@ -50,7 +55,7 @@ def fillers(path: Path) -> list[str]:
 
 def participles(path: Path) -> list[str]:
     """Functions that are called by a participle; a property is a value."""
-    nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    nodes = look_through(path)
     functions = [node for node in nodes if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
     verbs = [node.name for node in functions if not any("property" in ast.unparse(d) for d in node.decorator_list)]
     return [name for name in verbs if is_participle(name.strip("_").split("_")[0]) and name not in PUBLIC]
