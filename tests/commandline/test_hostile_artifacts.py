@@ -30,12 +30,20 @@ NO_TEXT = os.fsdecode(b"a\xff")
 MARK = "from pathlib import Path\nPath('ran').write_text('yes')\n\n\ndef arm():\n    pass\n"
 
 
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a log that was imported, and a module that leaves a mark when it is imported."""
+    folder = tmp_path_factory.mktemp("imported")
+    (folder / "log.csv").write_text(LOG)
+    (folder / "evil.py").write_text(MARK)
+    done("import", "source=log.csv", "mapping=plain", "name=a", folder=folder)
+    return folder
+
+
 @pytest.fixture
-def artifact(tmp_path: Path) -> Path:
-    """An imported log as runs/a/import, in a folder with a module that leaves a mark when it is imported."""
-    (tmp_path / "log.csv").write_text(LOG)
-    (tmp_path / "evil.py").write_text(MARK)
-    done("import", "source=log.csv", "mapping=plain", "name=a", folder=tmp_path)
+def artifact(imported: Path, tmp_path: Path) -> Path:
+    """The imported log as runs/a/import, in a copy of its folder."""
+    shutil.copytree(imported, tmp_path, dirs_exist_ok=True)
     return tmp_path / "runs/a/import"
 
 

@@ -19,14 +19,12 @@ pytestmark = pytest.mark.slow
 FOREVER = {
     "collect": ("episodes=2000",),
     "train-forward": ("data=chain/collect_real", "model=mlp", "model.epochs=1000000", "model.patience=1000000"),
-    "train-inverse": ("data=chain/collect_sim", "model=mlp", "model.epochs=1000000", "model.patience=1000000"),
     "optimize": ("grounding=none", "rollouts=500"),
-    "evaluate": ("policies=chain/optimize", "episodes=2000"),
     "iterate": ("grounding=gat", "budget.real_episodes=2000"),
     "compare": ("iterate.budget.rollouts=500",),
 }
 STOPS = signal.SIGINT, signal.SIGTERM
-WORKERS = {"collect": "workers=2", "optimize": "workers=2", "evaluate": "workers=2", "iterate": "workers=2",
+WORKERS = {"collect": "workers=2", "optimize": "workers=2", "iterate": "workers=2",
            "compare": "iterate.workers=2"}  # fmt: skip
 
 

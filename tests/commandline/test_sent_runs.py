@@ -23,11 +23,19 @@ AGAIN = "copy the run again, or build it anew with force=true"
 WORLD = "world/mine.yaml"
 
 
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a log that was imported."""
+    place = tmp_path_factory.mktemp("imported")
+    (place / "log.csv").write_text(LOG)
+    done("import", "source=log.csv", "mapping=plain", "name=a", folder=place)
+    return place
+
+
 @pytest.fixture
-def run(tmp_path: Path) -> Path:
-    """An imported log as runs/a/import, with a page and a world, as a diagnosis has them."""
-    (tmp_path / "log.csv").write_text(LOG)
-    done("import", "source=log.csv", "mapping=plain", "name=a", folder=tmp_path)
+def run(imported: Path, tmp_path: Path) -> Path:
+    """The imported log as runs/a/import, with a page and a world, as a diagnosis has them."""
+    shutil.copytree(imported, tmp_path, dirs_exist_ok=True)
     folder = tmp_path / "runs/a/import"
     (folder / "world").mkdir()
     for name, text in ((WORLD, "defaults: [nao_ideal, _self_]\nstep: 0.001\n"), ("report.html", "<p>\n")):
@@ -83,9 +91,8 @@ def test_a_page_that_was_changed_is_not_opened(run: Path, tmp_path: Path) -> Non
     assert refused("open", "a", folder=tmp_path) == f"runs/a/import/report.html: is missing; {AGAIN}"
 
 
-def test_a_page_that_was_laid_into_a_run_is_not_opened(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text(LOG)
-    done("import", "source=log.csv", "mapping=plain", "name=a", folder=tmp_path)
+def test_a_page_that_was_laid_into_a_run_is_not_opened(imported: Path, tmp_path: Path) -> None:
+    shutil.copytree(imported, tmp_path, dirs_exist_ok=True)
     assert "has no page: import writes none" in refused("open", "a", folder=tmp_path)
     (tmp_path / "runs/a/import/report.html").write_text("<script>")
     assert refused("open", "a", folder=tmp_path).endswith("is no file of the artifact; take it out of the folder")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import resource
+import shutil
 import struct
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import strangers
-from commands import ENVIRONMENT, SMALL, done, gsl, refused
+from commands import ENVIRONMENT, SMALL, done, forget_modules, gsl, refused
 
 from gsl.core.budget import DEPTH, within
 from gsl.core.trust import check_code, code_in, modules_in
@@ -30,6 +31,7 @@ from gsl.storage.requests import seal, write_request
 pytestmark = pytest.mark.slow
 
 SECONDS = 30.0
+SHORT = ("preset=toy", "task.duration=0.2", "workers=1")
 LOG = "time,action.a,position.a\n" + "".join(f"{0.01 * k:.2f},{0.1 * k},{0.1 * k}\n" for k in range(50))
 SIGNALS = "signals:\n  action: 'action.{joint}'\n  position: 'position.{joint}'\n"
 MARK = "from pathlib import Path\nPath('ran').write_text('yes')\n\n\nclass Thing:\n    pass\n\n\ndef run():\n    pass\n"
@@ -93,8 +95,16 @@ FILES = {
 }
 
 
-@pytest.mark.parametrize("how", [("--cfg", "job"), ("--help",), ("--multirun",)], ids=" ".join)
-@pytest.mark.parametrize("name", FILES)
+SHOWN = ("world/theirs", "world/effect", "world/robot", "world/environment", "experiment/plugin", "experiment/trusting")
+
+
+@pytest.mark.parametrize(
+    ("name", "how"),
+    [
+        *((name, how) for name in FILES for how in (("--cfg", "job"), ("--multirun",))),
+        *((name, ("--help",)) for name in SHOWN),
+    ],
+)
 def test_a_folder_of_configuration_runs_nothing(name: str, how: tuple[str, ...], place: Path) -> None:
     path = place / f"theirs/{name}.yaml"
     path.parent.mkdir(parents=True)
@@ -112,17 +122,12 @@ def test_the_refusal_says_what_to_type_and_that_is_enough(place: Path) -> None:
         "@component\nclass Lab(BulletWorld):\n    pass\n"
     )
     (place / "mine/world/lab.yaml").write_text("defaults: [nao_ideal, _self_]\n_target_: lab_world.Lab\n")
-    command = ("collect", "--config-dir", "mine", "world=lab", "preset=toy", "workers=1", "task.duration=0.2", "name=x")
-    environment = {**ENVIRONMENT, "PYTHONPATH": str(Path(__file__).parents[2])}
-
-    def run(*more: str) -> subprocess.CompletedProcess[str]:
-        words = [sys.executable, "-m", "gsl", *command, *more]
-        return subprocess.run(words, cwd=place, env=environment, capture_output=True, text=True, check=False)
-
-    result = run()
-    assert result.returncode == 2
-    assert "say trust=lab_world if" in result.stderr
-    assert run("trust=lab_world").returncode == 0
+    command = ("collect", "--config-dir", "mine", "world=lab", *SHORT, "name=x")
+    said = gsl(*command, folder=place)
+    assert said.code == 2
+    assert "say trust=lab_world if" in said.err
+    done(*command, "trust=lab_world", folder=place)
+    forget_modules(place)
     manifest = json.loads((place / "runs/x/collect_real/manifest.json").read_text())
     assert manifest["trust"] == ["lab_world"]
 
@@ -227,8 +232,8 @@ def test_plugins_of_hydra_and_libraries_in_the_current_folder_are_not_imported(p
         path.write_text(MARK)
     environment = {**ENVIRONMENT, "PYTHONPATH": str(Path(__file__).parents[2])}
     words = [sys.executable, "-m", "gsl", "import", "source=log.csv", "mapping=plain", "--check"]
-    subprocess.run([*words, "--cfg", "job"], cwd=place, env=environment, capture_output=True, check=True)
-    subprocess.run(words, cwd=place, env=environment, capture_output=True, check=False)
+    ended = subprocess.run(words, cwd=place, env=environment, capture_output=True, text=True, check=True)
+    assert "nothing is written" in ended.stdout
 
 
 def request(folder: Path, target: str) -> None:
@@ -381,9 +386,17 @@ def test_a_robot_of_very_many_joints_is_refused(count: int, problem: str, place:
     assert said.startswith(f"long.urdf: has {problem}")
 
 
+@pytest.fixture(scope="module")
+def imported(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("imported")
+    (folder / "log.csv").write_text(LOG)
+    done("import", "source=log.csv", "mapping=plain", "name=a", folder=folder)
+    return folder / "runs"
+
+
 @pytest.fixture
-def artifact(place: Path) -> Path:
-    done("import", "source=log.csv", "mapping=plain", "name=a", folder=place)
+def artifact(imported: Path, place: Path) -> Path:
+    shutil.copytree(imported, place / "runs")
     return place / "runs/a/import"
 
 
@@ -536,7 +549,7 @@ def test_a_world_of_a_stranger_takes_a_servo_of_its_own_place_or_the_users_alone
         world.write_text(f"defaults: [learned, _self_]\nservo: {servo}\n")
         assert problem in refused(*words, *typed, folder=here), (servo, typed)
     world.with_name("v.yaml").write_text("defaults: [learned, _self_]\nservo: ../elsewhere\n")
-    assert out in "".join(gsl(*words[:2], "--multirun", "world=nao_ideal,v", *SMALL, folder=here).lines)
+    assert out in "".join(gsl(*words[:2], "--multirun", "world=nao_ideal,v", *SHORT, folder=here).lines)
     experiment = here / "theirs/experiment/e.yaml"  # a grounding that hides among the values of a preset
     experiment.parent.mkdir()
     hidden = "preset: {g: {_target_: gsl.grounding.servo.LearnedServo, servo: ../elsewhere}}"

@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from commands import ENVIRONMENT
+from commands import ENVIRONMENT, forget_modules, gsl
 
 from gsl.core.own_code import describe_own
 
@@ -38,11 +38,16 @@ class Mine(WalkEngine):
 def test_work_that_a_users_own_code_ends_has_failed(workers: int, tmp_path: Path) -> None:
     (tmp_path / "exits.py").write_text(EXITS)
     words = ("collect", "policy._target_=exits.Mine", "preset=toy", "task.duration=1.6", f"workers={workers}")
-    line = [sys.executable, "-m", "gsl", *words, "name=refused"]  # workers of an earlier test stand in another folder
-    ended = subprocess.run(line, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
-    assert ended.returncode == 1
-    said = ended.stderr.splitlines()[-1].removeprefix("gsl collect: ")
-    assert said.startswith("exits.Mine.start failed (exits.py, line 8): SystemExit: 0")
+    if workers == 1:
+        code, _, said = gsl(*words, "name=refused", folder=tmp_path)
+        forget_modules(tmp_path)
+    else:  # workers of an earlier test stand in another folder
+        line = [sys.executable, "-m", "gsl", *words, "name=refused"]
+        ended = subprocess.run(line, cwd=tmp_path, env=ENVIRONMENT, capture_output=True, text=True, check=False)
+        code, said = ended.returncode, ended.stderr
+    assert code == 1
+    wanted = "gsl collect: exits.Mine.start failed (exits.py, line 8): SystemExit: 0"
+    assert said.splitlines()[-1].startswith(wanted)
 
 
 def _fail(folder: Path, name: str) -> ZeroDivisionError:

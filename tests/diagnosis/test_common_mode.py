@@ -79,19 +79,20 @@ def dry() -> Problem:
     return problem_of({"coulomb_friction": [{"torque": 0.2, "joints": "legs"}, {"torque": 0.1, "joints": "arms"}]})
 
 
+@pytest.fixture(scope="module")
+def knee() -> Problem:
+    """Return the problem of a robot with a knee that is damped half as much."""
+    return problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
+
+
 @pytest.mark.parametrize("offset, causes", [(0.006, 1), (0.001, 0)])
 def test_zeros_of_many_joints_stand_by_their_calibration_whatever_chance_gains(offset: float, causes: int) -> None:
+    """And whatever an interval says."""
     off = problem_of({"sensor_bias": {"bias": offset, "joints": "legs"}}).only(("sensor_bias", "zero_offset"))
-    chance = Thresholds(share=0.5)  # as where joints shake
-    chosen = Search(off, off.fit_calibration(), chance).select().chosen
-    assert [candidate.scope for candidate in chosen.candidates] == ["legs"] * causes
-
-
-def test_zeros_that_stand_by_their_spread_stand_whatever_an_interval_says() -> None:
-    off = problem_of({"sensor_bias": {"bias": 0.006, "joints": "legs"}}).only(("sensor_bias", "zero_offset"))
-    search = Search(off, off.fit_calibration(), Thresholds(share=0.5))
+    search = Search(off, off.fit_calibration(), Thresholds(share=0.5))  # as where joints shake
     chosen = search.select().chosen
-    assert set(find_idle(chosen, 3.0, NAO)) == search.uphold(chosen) == {"sensor_bias"}
+    assert [candidate.scope for candidate in chosen.candidates] == ["legs"] * causes
+    assert set(find_idle(chosen, 3.0, NAO)) == search.uphold(chosen) == {*["sensor_bias"] * causes}
 
 
 def test_a_gain_of_one_joint_is_named_beside_a_friction_of_all_though_the_calibration_explains_it() -> None:
@@ -109,22 +110,19 @@ def test_a_joint_in_which_the_calibration_undoes_a_cause_is_no_part_of_it() -> N
     assert cause.entry(value)["kd"] == pytest.approx(0.5, rel=0.05)
 
 
-def test_what_frees_the_shifts_stands_whatever_chance_gains_on_residuals() -> None:
-    knee = problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
+def test_what_frees_the_shifts_stands_whatever_chance_gains_on_residuals(knee: Problem) -> None:
     search = Search(knee, knee.fit_calibration(), Thresholds(gain=1e4))
     assert search.select().chosen.places == {("servo_gain", "LKneePitch")}
 
 
-def test_where_joints_shake_what_frees_the_shifts_stands_as_anything_else() -> None:
-    knee = problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
+def test_where_joints_shake_what_frees_the_shifts_stands_as_anything_else(knee: Problem) -> None:
     chances = [Chance(1e4, 0.0, 1.0, 1.0)]
     search = Search(knee, knee.fit_calibration(), Thresholds.of(chances, knee.settings, 1e-9))
     assert not search.select().chosen.candidates
 
 
 @pytest.mark.parametrize(("freed", "causes"), [(20.0, 1), (1e4, 0)])
-def test_what_chance_frees_of_the_shifts_stands_for_nothing(freed: float, causes: int) -> None:
-    knee = problem_of({"servo_gain": {"kd": 0.5, "joints": "LKneePitch"}}).only(("servo_gain",))
+def test_what_chance_frees_of_the_shifts_stands_for_nothing(freed: float, causes: int, knee: Problem) -> None:
     thresholds = Thresholds.of([Chance(1e4, freed, 1.0, 1.0), Chance(5e3, 0.0, 1.0, 1.0)], knee.settings, 0.0)
     chosen = Search(knee, knee.fit_calibration(), thresholds).select().chosen
     assert len(chosen.candidates) == causes

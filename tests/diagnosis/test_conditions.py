@@ -215,10 +215,17 @@ def folds(folder: Path) -> list[dict[str, Any]]:
     return rows
 
 
-def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
-    written(both(**CAUSE), tmp_path / "logs.parquet")
-    done("cross-validate", "real=logs.parquet", *LINE, SMALL, "name=c", folder=tmp_path)
-    folder = tmp_path / "runs/c/cross_validate"
+@pytest.fixture(scope="module")
+def validated(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a log of two gains and its cross-validation."""
+    place = tmp_path_factory.mktemp("validated")
+    written(both(**CAUSE), place / "logs.parquet")
+    done("cross-validate", "real=logs.parquet", *LINE, SMALL, "name=c", folder=place)
+    return place
+
+
+def test_a_cross_validation_holds_out_label_by_label(validated: Path) -> None:
+    folder = validated / "runs/c/cross_validate"
     assert [fold["values"] for fold in folds(folder)] == [[0.5], [1.0]]
     assert all(fold["causes"] == ["command_latency"] for fold in folds(folder))
     for fold in folds(folder):
@@ -227,19 +234,19 @@ def test_a_cross_validation_holds_out_label_by_label(tmp_path: Path) -> None:
         assert errors["diagnosed"] < 0.3 * errors["as it was"]
         assert len(fold["names"]) == len(fold["errors"]["GAT"]) == len(fold["errors"]["diagnosed + GAT"]) == 9
     assert "in 18 of 18 trajectories" in (folder / "table.md").read_text()
-    said = refused("cross-validate", "real=logs.parquet", *LINE[:-1], "by=date", folder=tmp_path)
+    said = refused("cross-validate", "real=logs.parquet", *LINE[:-1], "by=date", folder=validated)
     assert said == "by = date: needs a label with two values at least; the log's labels: gain, policy"
     for usual, line in (
         ("[ground_friction]", "ground_friction: is no effect of all joints"),
         ("[]", "names at least one"),
     ):
-        said = refused("cross-validate", "real=logs.parquet", *LINE, f"usual={usual}", folder=tmp_path)
+        said = refused("cross-validate", "real=logs.parquet", *LINE, f"usual={usual}", folder=validated)
         assert said.startswith("usual") and line in said
-    said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=3", folder=tmp_path)
+    said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=3", folder=validated)
     assert said == "folds = 3: the label gain has 2 values"
-    said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=2", "checks=values", folder=tmp_path)
+    said = refused("cross-validate", "real=logs.parquet", *LINE, "folds=2", "checks=values", folder=validated)
     assert said == "folds = 2: two groups leave no next one to check on; take three, or checks=motions"
-    said = refused("cross-validate", "real=logs.parquet", *LINE, "checks=values", folder=tmp_path)
+    said = refused("cross-validate", "real=logs.parquet", *LINE, "checks=values", folder=validated)
     assert said == "by = gain: two groups leave no next one to check on; take three, or checks=motions"
 
 
@@ -296,7 +303,7 @@ def test_a_learned_grounding_brings_replays_nearer(cause: dict[str, Any], residu
     assert np.mean(errors) < left * mean_errors(bare().simulator, {}, no_shifts(2), records[6:], arm()).mean()
 
 
-@pytest.mark.parametrize("delay", [0.02, 0.03, 0.04])
+@pytest.mark.parametrize("delay", [0.03, 0.04])
 def test_on_top_of_a_diagnosed_delay_a_grounding_looks_over_it(delay: float) -> None:
     latency = {"command_latency": {"delay": delay}}
     records, late = to_records(log({**latency, **STICKY}, jitter=0.0), arm()), replace(bare(), effects=latency)
@@ -356,14 +363,13 @@ def test_what_a_replay_cannot_learn_is_refused(model: dict[str, Any], line: str)
     assert str(caught.value).startswith(line)
 
 
-def test_what_is_held_out_changes_nothing_of_its_diagnosis(tmp_path: Path) -> None:
+def test_what_is_held_out_changes_nothing_of_its_diagnosis(validated: Path, tmp_path: Path) -> None:
+    other = {"coulomb_friction": {"torque": 0.3}}
     stiff = labelled(log(CAUSE, jitter=0.0), gain=1.0)
-    for name, other in (("a", CAUSE), ("b", {"coulomb_friction": {"torque": 0.3}})):
-        soft = labelled(log({**other, **SOFT}, jitter=0.0), gain=0.5, conditions=SOFT)
-        written(joined(stiff, soft), tmp_path / f"{name}.parquet")
-        line = (f"real={name}.parquet", *LINE, SMALL, "gat=null", f"name={name}")
-        done("cross-validate", *line, folder=tmp_path)
-    first, second = (folds(tmp_path / f"runs/{name}/cross_validate")[0] for name in "ab")
+    soft = labelled(log({**other, **SOFT}, jitter=0.0), gain=0.5, conditions=SOFT)
+    written(joined(stiff, soft), tmp_path / "other.parquet")
+    done("cross-validate", "real=other.parquet", *LINE, SMALL, "gat=null", "name=c", folder=tmp_path)
+    first, second = (folds(place / "runs/c/cross_validate")[0] for place in (validated, tmp_path))
     assert first["values"] == second["values"] == [0.5]
     assert first["parameters"] == second["parameters"]
-    assert first["errors"] != second["errors"]
+    assert first["errors"]["diagnosed"] != second["errors"]["diagnosed"]

@@ -248,7 +248,7 @@ LIFT = """<robot name="lift"><link name="base"/><link name="a"><inertial><mass v
 </joint></robot>"""
 
 
-@pytest.mark.parametrize(("axis", "force"), [("0 0 1", 5.0), ("1 0 0", 5.0), ("0 0 1", 0.0)])
+@pytest.mark.parametrize(("axis", "force"), [("0 0 1", 5.0), ("0 0 1", 0.0)])
 def test_what_a_cross_validation_finds_of_a_slide_is_true_of_the_rest(axis: str, force: float, tmp_path: Path) -> None:
     (tmp_path / "lift.urdf").write_text(LIFT.format(axis=axis))
     dry = (f"world.effects.coulomb_friction.torque={force}", "policy.motions=[steps_small,chirp,triangle_slow]")

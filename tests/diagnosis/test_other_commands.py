@@ -115,7 +115,7 @@ def test_chance_gains_no_more_where_desired_speeds_leave_no_lag(effects: Mapping
         episodes.append(Trajectory(PERIOD * np.arange(len(path)), targets, position, 0.0 * position, sensors=sensors))
     about = {"episodes": [{"policy": name} for name in order]}
     batch = Batch(tuple(episodes), arm().controlled, PERIOD, about)
-    result = diagnose(batch, nominal(arm()), STEP, replace(FEW, nulls=3, seed=1), lambda phase: None)
+    result = diagnose(batch, nominal(arm()), STEP, replace(FEW, nulls=2, seed=1), lambda phase: None)
     assert max(chance.gain for chance in result.chances) < 50.0
     assert (result.verdict.word, result.selection.chosen.names) == (word, tuple(effects))
 

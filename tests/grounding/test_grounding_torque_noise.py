@@ -102,12 +102,12 @@ def test_a_world_without_torques_is_refused_in_a_line() -> None:
 
 
 def test_it_goes_through_a_search_and_an_iteration(tmp_path: Path) -> None:
-    done("optimize", *SMALL, "optimizer.generations=1", "grounding=torque_noise", "name=one", folder=tmp_path)
+    few = ("task.duration=1.2", "optimizer.generations=1", "optimizer.candidates=4")
+    done("optimize", *SMALL, *few, "grounding=torque_noise", "name=one", folder=tmp_path)
     metrics = json.loads((tmp_path / "runs/one/optimize/metrics.json").read_text())
     assert metrics["grounding_acceptable"]
     late = ("real=nao_ideal", "real.effects.command_latency.delay=0.02")
     effects = "grounding.effects={command_latency:{delay:0.02}}"
-    few = ("task.duration=1.2", "optimizer.generations=1", "optimizer.candidates=4")
     chosen = ("grounding=effects_torque_noise", effects, "name=two")
     said = done("iterate", *SMALL, *few, *late, *chosen, folder=tmp_path)
     assert "real data: " in said.out

@@ -10,10 +10,9 @@ from torture import Slice, run
 pytestmark = pytest.mark.slow
 
 SHORT = (
-    Slice("kills", "optimize", 0, 2),
-    Slice("kills", "collect --multirun", 0, 2),
-    Slice("flips", "", 0, 40),
-    Slice("inputs", "", 0, 60),
+    Slice("kills", "train-forward", 0, 2),
+    Slice("flips", "", 0, 20),
+    Slice("inputs", "", 0, 20),
     Slice("disks", "", 0, 1),
 )
 

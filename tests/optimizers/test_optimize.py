@@ -28,7 +28,8 @@ pytestmark = pytest.mark.slow
 
 SETTINGS = [
     *("name=kill", "grounding=none", "task=arm", "policy=linear", "world.floating=false", "world.settle=0.1"),
-    *("optimizer.candidates=6", "optimizer.generations=6", "optimizer.sigma=0.2", "rollouts=1", "workers=1"),
+    *("optimizer.candidates=4", "optimizer.generations=5", "optimizer.sigma=0.2", "rollouts=1", "workers=1"),
+    "task.duration=1.0",
 ]
 
 
@@ -46,8 +47,8 @@ def test_the_file_holds_pi0_and_the_best_of_each_generation(tmp_path: Path) -> N
 
 
 def test_the_arm_learns_to_reach_its_goal(tmp_path: Path) -> None:
-    optimizer = CmaEs(candidates=12, generations=12, sigma=0.3)
-    search = Optimize(AIR, Arm(), REACH, NoGrounding(), optimizer, rollouts=1, workers=-1)
+    optimizer = CmaEs(candidates=8, generations=8, sigma=0.3)
+    search = Optimize(AIR, Arm(), REACH, NoGrounding(), optimizer, rollouts=1, workers=1)
     search.run(tmp_path, QUIET)
     values = [record.value_sim for record in read_policies(tmp_path / "policies.json").records[1:]]
     assert max(values) > 20 * values[0] or max(values) > 20.0
