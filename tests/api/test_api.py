@@ -13,7 +13,6 @@ import pytest
 from commands import done
 
 import gsl
-from gsl.effects.effect import names
 from gsl.errors import GslError
 from gsl.storage.trajectories import read
 
@@ -97,23 +96,6 @@ def test_what_refers_to_a_components_settings_sees_them(elsewhere: Path) -> None
     world, short = gsl.make_world("xl330_pendulum"), {"policy.motions": ["steps_large"], "policy.repeats": 1}
     made = gsl.run("collect", world=world, task="excite", name="pendulum", workers=1, **short)
     assert made.artifact.config["policy"]["robot"] == world.robot  # type: ignore[attr-defined]
-
-
-def test_a_diagnosis_is_an_object_with_its_page(elsewhere: Path) -> None:
-    late = {"world.effects.command_latency.delay": 0.02, "world.period": 0.02}
-    log = gsl.run("collect", world="xl330_pendulum", task="excite", name="air", workers=1, **late)
-    world = gsl.make_world("xl330_pendulum", period=0.02)
-    others = sorted({*names()} - {"command_latency", "coulomb_friction"})  # examples/ diagnoses with all effects
-    sizes = {"most": 1, "duels": 0, "nulls": 1, "workers": 1}
-    findings = gsl.diagnose(log.folder, world, without=others, **sizes)
-    assert "command_latency" in findings.causes
-    assert str(findings).startswith(f"{findings.verdict}: ")
-    assert 'iframe srcdoc="' in findings._repr_html_()
-    assert 'sandbox="allow-scripts"' in findings._repr_html_()  # of an origin of its own: not the notebook's
-    assert "command_latency" in findings.world.effects  # type: ignore[attr-defined]
-    assert findings.page == findings.folder / "report.html"
-    delay = findings.suspects.set_index("parameter").loc["delay"]
-    assert (delay.effect, delay.unit) == ("command_latency", "s") and delay.low < delay.value < delay.high
 
 
 @pytest.mark.parametrize(
