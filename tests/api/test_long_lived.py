@@ -55,9 +55,12 @@ CAR = """
 from gymnasium.envs.classic_control import Continuous_MountainCarEnv
 
 class Car(Continuous_MountainCarEnv):
+    steps = 0
+
     def step(self, action):
-        state, _, *rest = super().step(action)
-        return state, REWARD, *rest
+        state, _, ended, _, info = super().step(action)
+        self.steps += 1
+        return state, REWARD, ended, self.steps % 9 == 0, info
 """
 PROMPT = """
 import gsl
@@ -78,7 +81,7 @@ for workers in (1, 2):
     said.append({float(reward) for reward in log.episodes[0].reward[1:]})
 print(*said)
 """
-FEW = {"world": "nao_ideal", "task": "mine", "episodes": 1, "workers": 1}
+FEW = {"world": "nao_ideal", "task": "mine", "episodes": 1, "neighbours": 0, "workers": 1}
 
 
 @pytest.fixture
@@ -111,23 +114,23 @@ def rolled(module: ModuleType, workers: int) -> set[float]:
     return rewards(gsl.roll_out(gsl.make_world("nao_ideal"), module.Mine(), episodes=2, workers=workers))
 
 
-def test_a_class_that_is_defined_anew_acts_here_and_in_workers(home: Path) -> None:
-    module = importlib.import_module("task_of_mine")
-    assert [rolled(module, workers) for workers in (1, 2)] == [{1.0}, {1.0}]
-    rewarding(home, "2.50")
-    importlib.reload(module)
-    assert [rolled(module, workers) for workers in (1, 2)] == [{2.5}, {2.5}]
-
-
-def test_a_module_behind_it_that_is_loaded_anew_acts_in_workers_too(home: Path) -> None:
+def test_what_is_loaded_anew_acts_here_and_in_workers(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A module behind a class, the class itself, and one of a folder that was added, one after the other."""
     (home / "late_task.py").write_text("VALUE = 1.0\n")
     rewarding(home, "late_task.VALUE", code=f"import late_task\n{TASK}")
     module = importlib.import_module("task_of_mine")
-    assert rolled(module, 2) == {1.0}
+    assert [rolled(module, workers) for workers in (1, 2)] == [{1.0}, {1.0}]
     (home / "late_task.py").write_text("VALUE = 2.50\n")
     importlib.reload(sys.modules["late_task"])
     importlib.reload(module)
     assert [rolled(module, workers) for workers in (1, 2)] == [{2.5}, {2.5}]
+    rewarding(home, "4.0")
+    importlib.reload(module)
+    assert [rolled(module, workers) for workers in (1, 2)] == [{4.0}, {4.0}]
+    (home / "src").mkdir()
+    rewarding(home / "src", "3.0", "later_task")
+    monkeypatch.setattr(sys, "path", [str(home / "src"), *sys.path])
+    assert rolled(importlib.import_module("later_task"), 2) == {3.0}
 
 
 def test_workers_keep_a_module_of_the_folder_in_which_python_began(home: Path) -> None:
@@ -145,14 +148,6 @@ def test_an_environment_that_is_defined_anew_acts(home: Path) -> None:
     rewarding(home, "2.50", "car_of_mine", CAR)
     importlib.reload(sys.modules["car_of_mine"])
     assert rewards(gsl.roll_out(world, task, policy)) == {2.5}
-
-
-def test_workers_import_from_where_this_process_does(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    rolled(importlib.import_module("task_of_mine"), 2)
-    (home / "src").mkdir()
-    rewarding(home / "src", "3.0", "late_task")
-    monkeypatch.setattr(sys, "path", [str(home / "src"), *sys.path])
-    assert rolled(importlib.import_module("late_task"), 2) == {3.0}
 
 
 def test_nothing_is_written_down_as_of_code_that_did_not_run(home: Path) -> None:

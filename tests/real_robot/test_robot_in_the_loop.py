@@ -146,19 +146,6 @@ def test_a_tape_measure_gives_the_same_values_as_a_log_of_the_base(
             assert row["outcome"] == pytest.approx(other["outcome"], rel=1e-9)
 
 
-def test_a_run_of_a_real_robot_is_repeated_from_its_answers_wherever_its_settings_point(tmp_path: Path) -> None:
-    words = ("collect", *SMALL, "world=robot", "name=two")
-    done("rehearse", f"request={_asked(*words, folder=tmp_path)}", "world=nao_worn", folder=tmp_path)
-    done(*words, folder=tmp_path)
-    made = tmp_path / "runs/two/collect_real"
-    text = (made / "config.yaml").read_text()
-    assert "requests: runs/two/collect_real.request" in text
-    (made / "config.yaml").write_text(text.replace("runs/two/collect_real.request", "elsewhere"))
-    seal(made)
-    done("rerun", "two/collect_real", folder=tmp_path)
-    assert not (tmp_path / "elsewhere").exists()
-
-
 COLLECT = ("collect", *SMALL, "world=robot", "name=one", "recipe.spread=0.02")
 ASKED = "runs/one/collect_real.request"
 
@@ -191,6 +178,18 @@ def test_a_file_dropped_into_the_folder_is_taken(place: Path) -> None:
     (place / ASKED / ANSWER).write_bytes((place / "runs/elsewhere" / ANSWER).read_bytes())
     assert done(*COLLECT, folder=place).out.splitlines()[-1] == "runs/one/collect_real"
     assert done(*COLLECT, folder=place).out.splitlines()[-1] == "runs/one/collect_real (unchanged)"
+
+
+def test_a_run_of_a_real_robot_is_repeated_from_its_answers_wherever_its_settings_point(place: Path) -> None:
+    (place / ASKED / ANSWER).write_bytes((place / "runs/elsewhere" / ANSWER).read_bytes())
+    done(*COLLECT, folder=place)
+    made = place / "runs/one/collect_real"
+    text = (made / "config.yaml").read_text()
+    assert f"requests: {ASKED}" in text
+    (made / "config.yaml").write_text(text.replace(ASKED, "away"))
+    seal(made)
+    done("rerun", "one/collect_real", folder=place)
+    assert not (place / "away").exists()
 
 
 def test_an_unanswered_request_follows_its_settings_and_keeps_what_is_not_its_own(place: Path) -> None:

@@ -160,10 +160,10 @@ def test_a_killed_worker_costs_only_its_own_jobs(tmp_path: Path) -> None:
 
 
 def test_workers_may_die_more_often_than_in_vain(tmp_path: Path) -> None:
-    jobs = [Job(np.zeros(1), seed) for seed in range(3 * parallel.TRIES)]
+    jobs = [Job(np.zeros(1), seed) for seed in range(2 * (parallel.TRIES + 1))]  # two workers may die at a time
     with QUIET.progress(len(jobs), "") as progress:
         done = parallel.in_parallel(partial(_dies_at_first, tmp_path / "died"), arm(), jobs, 2, progress)
-    assert done == list(range(3 * parallel.TRIES))
+    assert done == [job.seed for job in jobs]
 
 
 def test_workers_that_always_die_end_in_one_clear_line(tmp_path: Path) -> None:
