@@ -26,7 +26,7 @@ LONG = 60.0  # what takes less is begun without a word: a rollout of each world 
 LEARNED = 1.4  # how much longer a rollout takes with a learned grounding
 APART = 25.0  # of a learned grounding: fits and checks [s]
 FLOWN = {  # a second of motion in the air, on two cores [s]
-    "diagnose": 7.5,
+    "diagnose": 2.5,
     "identify": 2.0,
     "servo": 1.0,
     "servo_on_effects": 1.0,

@@ -61,8 +61,8 @@ SHRUNK = {
     "collect": ("policy.motions=[steps_large,triangle_slow]", "policy.duration=1.5", "workers=1"),
     "diagnose": ("most=1", "duels=0", "nulls=0", "limits=false", f"without={sorted(set(names()) - FEW)}", "workers=1"),
     "train-servo": ("workers=1",),
-    "optimize": (*TOY, "accept=true"),
-    "evaluate": TOY,
+    "optimize": (*TOY, "accept=true", "optimizer.generations=1", "optimizer.candidates=4", "rollouts=1"),
+    "evaluate": (*TOY, "check=1"),
     "show": (),
 }
 

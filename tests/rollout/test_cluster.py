@@ -29,7 +29,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.filterwarnings("default")]  # other 
 
 NOWHERE = "tcp://127.0.0.1:9"  # a port of the system at which nobody listens
 SOON = 10.0  # [s]
-SEARCH = ("optimize", "name=k", "preset=toy", "task.duration=1.6", "workers=2", "grounding=none")
+SEARCH = ("optimize", "name=k", "preset=toy", "task.duration=0.8", "workers=2", "grounding=none")
 
 
 @pytest.fixture(scope="module")
@@ -122,14 +122,15 @@ def test_workers_that_do_not_start_are_one_line(monkeypatch: pytest.MonkeyPatch)
 
 def test_trials_of_a_study_go_to_the_workers(address: str, tmp_path: Path) -> None:
     left = ("ane_01", "ane_02", "gat", "gat_005", "effects", "effects_gat")
-    words = ("compare", "preset=toy", "trials=2", "iterate.task.duration=1.2", "iterate.workers=1", "~worlds.nao_weak")
-    words = (*words, *(f"~methods.{name}" for name in left), "preset.generations=1", "preset.candidates=4")
+    words = ("compare", "preset=toy", "trials=1", "iterate.task.duration=0.6", "iterate.workers=1", "~worlds.nao_weak")
+    few = ("preset.generations=1", "preset.candidates=4", "preset.rollouts=1", "preset.episodes=1")
+    words = (*words, *(f"~methods.{name}" for name in left), *few)
     done(*words, "name=here", folder=tmp_path)
     said = done(*words, "name=there", "executor=dask", f"address={address}", folder=tmp_path)
     assert "collecting" not in said.err  # nothing is rolled out in this process
     assert payloads(tmp_path / "runs/here") == payloads(tmp_path / "runs/there")
     done("verify", "there", folder=tmp_path)
-    (tmp_path / "runs/there/nao_worn/none/trial_02/evaluate/metrics.json").write_text("{}")
+    (tmp_path / "runs/there/nao_worn/none/trial_01/evaluate/metrics.json").write_text("{}")
     assert gsl(*words, "name=there", folder=tmp_path).code == 2  # a link of the study, though a worker has built it
 
 

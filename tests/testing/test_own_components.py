@@ -151,6 +151,7 @@ def importable(home: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 OWN = ("--config-dir", "mine")
+FEW = ("recipe.sim_episodes=3", "recipe.sim_neighbours=1", "budget.rollouts=1", "budget.check=1", "budget.episodes=1")
 TRUSTED = (
     *("own_grounding", "own_optimiser", "own_task", "own_plain", "own_sim", "own_edited", "own_fault"),
     *(f"own_{kind}_{number}" for kind in ("lacking", "bad", "wrong") for number in range(9)),
@@ -161,7 +162,7 @@ TRUSTED = (
 def iterated(home: Path) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(home))
-        done("iterate", *OWN, *SMALL, "grounding=shrink", "optimizer=random_search", "accept=true",
+        done("iterate", *OWN, *SMALL, *FEW, "grounding=shrink", "optimizer=random_search", "accept=true",
              "trust=[own_grounding,own_optimiser]", "name=own", folder=home)  # fmt: skip
     return home / "runs/own"
 
@@ -211,8 +212,8 @@ def test_the_same_by_hand(iterated: Path, home: Path) -> None:
 def test_both_appear_in_compare(iterated: Path, home: Path) -> None:
     methods = [f"~methods.{name}" for name in ("none", "ane_01", "ane_02", "gat", "gat_005", "effects", "effects_gat")]
     own = ("+grounding@methods.shrink=shrink", "optimizer@iterate.optimizer=random_search", "trials=1")
-    own += ("iterate.optimizer.generations=1",)
-    done("compare", *OWN, *SMALL[:1], "iterate.task.duration=1.2", "iterate.workers=1", *methods, "~worlds.nao_weak",
+    own += ("iterate.optimizer.generations=1", *(f"iterate.{setting}" for setting in FEW[2:]))
+    done("compare", *OWN, *SMALL[:1], "iterate.task.duration=0.6", "iterate.workers=1", *methods, "~worlds.nao_weak",
          *own, "name=set", folder=home)  # fmt: skip
     assert "| shrink |" in (home / "runs/set/compare/table.md").read_text()
 
@@ -267,7 +268,7 @@ def test_what_learns_from_the_simulator_alone_costs_no_real_data(home: Path) -> 
     (home / "own_sim.py").write_text(SIM_ALONE)
     (home / "mine/grounding/sim_alone.yaml").write_text("_target_: own_sim.FromSim\nmodel: ''\n")
     search = ("optimizer=random_search", "optimizer.generations=1", "optimizer.candidates=2")
-    done("iterate", *OWN, *SMALL, "grounding=sim_alone", *search, "name=alone", folder=home)
+    done("iterate", *OWN, *SMALL, *FEW, "grounding=sim_alone", *search, "name=alone", folder=home)
     metrics = json.loads((home / "runs/alone/iterate/metrics.json").read_text())
     assert metrics["learned_from"] == 0
     assert not (home / "runs/alone/iteration_01/collect_real").exists()

@@ -36,7 +36,7 @@ pytestmark = pytest.mark.slow
 TASK = Arm(duration=0.4)
 WORN = {"servo_gain": {"kp": 0.4}}
 HELD = ("world.floating=false", "world.settle=0.1")
-NAMES = ("pi0", "generation_01", "generation_02")
+NAMES = ("pi0", "generation_01")
 LOW = ("episodes=2", "check=1", "confirmation=2", "workers=1")
 
 
@@ -131,6 +131,7 @@ def test_two_policies_have_no_order(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_an_iterate_stands_for_its_evaluations(arms: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     sizes = ("experiment=arm", "preset=toy", "grounding=none", "task.duration=0.4", "sim=nao_ideal", "workers=1")
+    sizes += ("preset.arm_generations=1", "preset.confirmation=2", "recipe.real_neighbours=0")
     done("iterate", "name=whole", *sizes, folder=tmp_path)
     monkeypatch.chdir(tmp_path)
     assert [path.name for path in list_parents("whole").values()] == ["iterate", "evaluate", "optimize"]

@@ -100,7 +100,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         (tmp_path / f"{module}.py").write_text(text)
     for group, text in {
         "grounding/choosy": "_target_: choosy.Choosy\nmodel: ''\nwrong: 1000\n",
-        "task/strides": "_target_: strides.Strides\nduration: 1.6\nfall_cost: 0.0\n",
+        "task/strides": "_target_: strides.Strides\nduration: 1.0\nfall_cost: 0.0\n",
         "optimizer/bold": "_target_: bold.Bold\ncandidates: 1\ngenerations: 1\n",
     }.items():
         path = tmp_path / f"mine/{group}.yaml"
