@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Sequence
-from functools import cache
 from typing import Annotated
 
 import typer
@@ -214,12 +213,6 @@ def _leave_current_folder() -> None:
         sys.path[:] = [place for place in sys.path if os.path.realpath(place or here) != here]
 
 
-@cache
-def _build() -> Callable[..., int | None]:
-    """Return all commands as click has them: a process that calls many, as a notebook does, builds them once."""
-    return typer.main.get_command(app)
-
-
 def call(arguments: Sequence[str]) -> int:
     """Run one command line and return its exit code, with whatever went wrong told in a line."""
     Console.quiet = bool(QUIET.intersection(arguments))
@@ -230,7 +223,7 @@ def call(arguments: Sequence[str]) -> int:
     if word := next((word for word in arguments if not is_text(word)), ""):
         return console.error(f"an argument is no text in UTF-8: {word}; rename what it names", 2)
     try:
-        code = int(_build()(args=list(arguments), prog_name="gsl", standalone_mode=False) or 0)
+        code = int(app(args=list(arguments), prog_name="gsl", standalone_mode=False) or 0)
         return report(KeyboardInterrupt(), console, command=_command(arguments)) if code == INTERRUPTED else code
     except BrokenPipeError:
         return leave_quietly()

@@ -15,6 +15,7 @@ from scripted_walks import AsScripted, Numbered, ScriptedWorld
 from gsl.errors import ArtifactError, ConfigError
 from gsl.policies.linear import Linear
 from gsl.policies.walk_engine import WalkEngine
+from gsl.report.run_page import DRAWN
 from gsl.stages.evaluate import Evaluate
 from gsl.storage.policies import read_policies, write_policies
 from gsl.storage.policy_choice import policies, record
@@ -76,7 +77,7 @@ def test_the_page_shows_the_joints_and_feet_of_what_is_reported(three: tuple[dic
     for part in ("Joint by joint: fast", "Joint by joint: π0", "fast on the real side", "π0 on the real side"):
         assert part in text
     assert "from real" not in text  # of no search, no simulator is told
-    assert Page(text).tags["option"] == 2 * len(GROUND.layout.joints)
+    assert Page(text).tags["option"] == 2 * DRAWN and f"Shown are {DRAWN} of {len(GROUND.layout.joints)} joints" in text
 
 
 def test_fresh_episodes_are_not_those_of_the_choice(three: tuple[dict, dict, Path]) -> None:
