@@ -45,7 +45,7 @@ class Budget:
         check_tolerated(self.tolerated, self.check)
 
     @property
-    def screened(self) -> int:
+    def screening_episodes(self) -> int:
         """Simulated episodes of a winner before the robot tries it; none where falls are tolerated."""
         return 0 if self.tolerated else self.screening
 

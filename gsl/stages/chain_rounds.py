@@ -166,7 +166,7 @@ class Chain(Links):
             grounding=grounding,
             optimizer=self.optimizer,
             rollouts=self.budget.rollouts,
-            screening=self.budget.screened,
+            screening=self.budget.screening_episodes,
             objective=self.objective,
             quantile=self.quantile,
             initial=previous,

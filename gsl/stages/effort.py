@@ -71,7 +71,7 @@ def plan_search(iterate: Iterate, each: float) -> Part:
     """Return a search whose rollouts take `each` [s] as a part of planned work."""
     count, generations = count_rollouts(iterate), iterate.optimizer.generations
     if isinstance(iterate.optimizer, Search):
-        return Part(count * each / threads(iterate.workers), count + generations * iterate.budget.screened)
+        return Part(count * each / threads(iterate.workers), count + generations * iterate.budget.screening_episodes)
     return Part(count * STEP + generations * iterate.budget.rollouts * each, count)
 
 

@@ -32,6 +32,7 @@ class Cut:
         held_out: Windows for checking, shape (n_held_out,).
         period: Control period [s].
         by_record: Whether whole records are held out; else parts of one, which is weaker.
+        asked: Indices of the records that a label holds out.
         order: Place in the batch of each record.
         made_at: Physics period of the simulator of gsl's own that made it [s], None of any other log.
         settings: How it was cut.
@@ -45,6 +46,7 @@ class Cut:
     held_out: np.ndarray
     period: float
     by_record: bool
+    asked: tuple[int, ...]
     order: tuple[int, ...]
     made_at: float | None
     settings: LogSettings
@@ -128,8 +130,7 @@ def cut_log(
     part = cut(batch, robot, walking=walking, held_out=held_out, blocks=blocks, settings=settings)
     how, joints = part.settings, np.full(len(robot.controlled), robot.encoder_step / np.sqrt(12.0))
     least = np.r_[joints, list(how.base_floor)] if walking else None
-    asked = label_indices([record.about for record in part.records], held_out or {})
-    noise = noise_floor(part.records, part.repeats, part.period, robot.encoder_step, least, asked, how.floor)
+    noise = noise_floor(part.records, part.repeats, part.period, robot.encoder_step, least, part.asked, how.floor)
     comparison = Comparison.plain(noise.sd) if walking else compare(part.pieces, noise, len(joints), how.floor)
     return Log(**{each.name: getattr(part, each.name) for each in fields(part)}, noise=noise, comparison=comparison)
 
@@ -162,7 +163,7 @@ def cut(
     if walking and any(record.conditions for record in records):
         raise InputError("conditions of a trajectory are for logs in the air; leave them out of its label")
     repeats = tuple(find_repeats(records, period, how.repeats))
-    asked = label_indices([record.about for record in records], held_out or {})
+    asked = tuple(label_indices([record.about for record in records], held_out or {}))
     parts = (how.walk_warm_up, how.walk_scored) if walking else (how.warm_up, how.scored)
     warm_up, scored = (round(part / period) for part in parts)
     pieces = cut_pieces(records, robot, period, warm_up=warm_up, scored=scored)
@@ -171,7 +172,7 @@ def cut(
     held, by_record = _hold_out(records, repeats, pieces, asked, how.block * scored if blocks else 0)
     train, check = np.flatnonzero(~held), np.flatnonzero(held)
     made_at = _read_step(batch)
-    return Cut(robot, records, repeats, pieces, train, check, period, by_record, order, made_at, how)
+    return Cut(robot, records, repeats, pieces, train, check, period, by_record, asked, order, made_at, how)
 
 
 def _read_step(batch: Batch) -> float | None:
