@@ -191,7 +191,17 @@ def _judge(
         log.noise.source != "repeats" and not options.tolerance,
         how,
         noise_cost,
+        _find_odd(log, rivals[0], own, how),
     )
+
+
+def _find_odd(log: Log, chosen: Hypothesis, own: Sequence[Trial], how: VerdictSettings) -> float:
+    """Return how much more a hypothesis leaves of a shaking joint than in logs of its own: logarithm, 1 if too much."""
+    if not own or not log.comparison.shaking.any():
+        return 0.0
+    usual = np.mean([trial.levels for trial in own], axis=0)
+    loud = log.comparison.shaking & (chosen.levels > how.loud)
+    return float(np.max(np.log(chosen.levels / usual)[loud], initial=0.0) / np.log(how.odd))
 
 
 def _margins(rivals: Sequence[Hypothesis], own: Sequence[Trial]) -> dict[str, float]:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from gsl.core.trajectory import Batch, Trajectory
 from gsl.diagnosis.log.files import check_log, log_files, on_ground, read_logs
 from gsl.diagnosis.log.floor import roughness
 from gsl.diagnosis.log.log import cut_log
+from gsl.diagnosis.log.residual import Comparison
 from gsl.errors import GslError
 from gsl.robots.nao import nao
 from gsl.storage.trajectories import write
@@ -142,13 +144,13 @@ def test_joints_that_shake_under_steps_do_not_pass_for_noise() -> None:
 LATE = ([0.0, 0.09], [1.0, -1.4, 0.49])  # how a joint follows, as a filter
 
 
-def straight_on(
+def compare_straight_on(
     more: Callable[[np.ndarray, np.ndarray, np.ndarray], None],
     sensors: Mapping[str, np.ndarray] | None = None,
     noise: float = 1.5e-3,
     seeds: tuple[int, ...] = (4,),
-) -> list[int]:
-    """Return which joints shake in logs of slow triangles and a wave, to which `more` adds something."""
+) -> Comparison:
+    """Return how logs of slow triangles and a wave are compared, to which `more` adds something."""
     time, episodes = 0.02 * np.arange(901), []
     for seed in seeds:
         commands = REST + np.zeros((900, len(REST)))
@@ -158,7 +160,12 @@ def straight_on(
         more(time + 0.05 * seed, commands, position)
         position += noise * np.random.default_rng(seed).standard_normal(position.shape)
         episodes.append(Trajectory(time, commands, position, np.zeros_like(position), sensors=dict(sensors or {})))
-    return list(np.flatnonzero(cut_log(Batch(tuple(episodes), NAO.controlled, 0.02, {}), NAO).comparison.shaking))
+    return cut_log(Batch(tuple(episodes), NAO.controlled, 0.02, {}), NAO).comparison
+
+
+def straight_on(*arguments: Any, **more: Any) -> list[int]:
+    """Return which joints shake there."""
+    return list(np.flatnonzero(compare_straight_on(*arguments, **more).shaking))
 
 
 def swing(time: np.ndarray, _: np.ndarray, position: np.ndarray) -> None:
@@ -169,6 +176,19 @@ def test_joints_that_shake_slowly_do_not_pass_for_a_gap() -> None:
     """At 6 Hz a joint is no rougher than a calm one: it moves though its commands are smooth and explain nothing."""
     assert straight_on(swing) == [0]
     assert straight_on(swing, seeds=(4, 5)) == [0]  # another phase each time
+
+
+def test_the_floor_of_a_joint_holds_how_a_shaking_neighbour_carries_it_along() -> None:
+    """Twice: the replay swings as well, at another phase."""
+
+    def carry(time: np.ndarray, commands: np.ndarray, position: np.ndarray) -> None:
+        swing(time, commands, position)
+        position[:, 1] += 0.0025 * np.sin(2 * np.pi * 6.0 * time)
+
+    still, carried = compare_straight_on(lambda *_: None), compare_straight_on(carry)
+    assert list(np.flatnonzero(carried.shaking)) == [0] and not still.shaking.any()
+    assert np.hypot(still.floor[1], 0.0015) < carried.floor[1] < np.hypot(still.floor[1], 0.003)
+    np.testing.assert_allclose(carried.floor[2:], still.floor[2:], rtol=0.15)
 
 
 def test_what_repeats_is_no_shaking() -> None:

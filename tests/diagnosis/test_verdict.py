@@ -99,7 +99,8 @@ def test_a_rival_whose_own_logs_get_the_same_answer_is_not_told_apart() -> None:
     }
 
     def mistakes(costs: dict[tuple[str, ...], list[tuple[float, float]]]) -> dict[str, float]:
-        trials = [Trial(truth, (), pair, 1.0, np.zeros(1)) for truth, pairs in costs.items() for pair in pairs]
+        rest = 1.0, np.ones(2), np.zeros(1)
+        trials = [Trial(truth, (), pair, *rest) for truth, pairs in costs.items() for pair in pairs]
         return measure_mistakes((joint, load), trials)
 
     assert mistakes(logs) == {"load_friction": 1.0}  # ahead by 290 and more, where the real log has it ahead by 400
@@ -113,6 +114,13 @@ def test_a_rival_whose_own_logs_get_the_same_answer_is_not_told_apart() -> None:
         verdict = Judge(1.0, mistakes={"load_friction": share}).judge(tried)
         assert verdict.word == "inseparable" and verdict.inseparable == (("coulomb_friction", "load_friction"),)
         assert verdict.causes[0].probability == pytest.approx(probability, abs=0.01)
+
+
+@pytest.mark.parametrize(("odd", "word"), [(0.7, "causes"), (1.3, "unknown")])
+def test_a_joint_that_shakes_as_its_causes_do_not_make_it_speaks_against_them(odd: float, word: str) -> None:
+    """Whatever share of the gap they explain."""
+    verdict = Judge(1.0, odd=odd).judge(selection(friction("shoulder", 100.0)))
+    assert verdict.word == word and verdict.explained == 1.0
 
 
 @pytest.mark.parametrize(

@@ -82,7 +82,7 @@ class Rehearsal:
     def _prepare(cls, findings: Findings, records: Sequence[Record], owner: np.ndarray) -> Rehearsal:
         log, n = findings.log, len(findings.log.joints)
         own = log.comparison
-        how = Comparison(own.floor[:n], own.shaking[:n], own.sway[:n])
+        how = Comparison(own.floor[:n], own.shaking[:n], own.sway[:n], own.carried[:n])
         exact = replace(log, records=tuple(records), comparison=Comparison.plain(np.zeros(n)))
         return cls(exact, findings.simulator, how, owner, findings.options.design.threads)
 

@@ -33,6 +33,7 @@ class NoiseFloor:
         samples: Independent numbers that it comes from, over all joints.
         white: Of white noise alone, from the quietest part of the spectrum [rad], shape (n_joints,).
         restless: Joints that move by much more than that, though commands are smooth, shape (n_joints,).
+        wandering: How far joints move about what smooth commands explain [rad], shape (n_joints,).
     """
 
     sd: np.ndarray
@@ -44,6 +45,7 @@ class NoiseFloor:
     samples: int
     white: np.ndarray
     restless: np.ndarray
+    wandering: np.ndarray
 
     @property
     def slack(self) -> float:
@@ -79,10 +81,11 @@ def noise_floor(
         least = np.maximum(np.maximum(resolution, grid) / np.sqrt(12.0), 1e-5)
     groups = [group for group in _group(records, repeats, held, how) if len(group) > 1]
     white = np.maximum(white_level(records, how), least)
-    restless = wavers = np.zeros(len(white), dtype=bool)
+    restless, wandering = np.zeros(len(white), dtype=bool), np.zeros(len(white))
     if air:  # on the ground steps shake a robot
-        wavers = _measure_wavering(records, white, period, how) > np.maximum(how.unsteadily * white, resolution)
+        wandering = _measure_wandering(records, white, period, how)
         restless = _find_restless(records, white, np.maximum(how.unwhite * white, resolution), how)
+    wavers = wandering > np.maximum(how.unsteadily * white, resolution)
     if groups:
         spread = [align_repeats(group, period)[:, how.settled :] for group in groups]
         square, slow = _variance(spread), _variance([in_blocks(part).mean(axis=2) for part in spread])
@@ -94,12 +97,14 @@ def noise_floor(
         unsteady = (sd > how.unsteady * usual) & (sd > own)
         restless |= wavers & (sd > how.unsteadily * white)  # what repeats as well shakes by no chance
         sd = np.where(unsteady, usual, sd)
-        return NoiseFloor(sd, np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples, white, restless)
+        return NoiseFloor(
+            sd, np.sqrt(slow), unsteady, "repeats", pairs, resolution, samples, white, restless, wandering
+        )
     restless |= wavers
     rough = roughness(records, how.quiet)
     sd = np.maximum(np.where(restless, np.minimum(rough, white), rough), least)
     calm = np.zeros(len(sd), dtype=bool)
-    return NoiseFloor(sd, np.zeros(len(sd)), calm, "estimated", 0, resolution, how.estimate, white, restless)
+    return NoiseFloor(sd, np.zeros(len(sd)), calm, "estimated", 0, resolution, how.estimate, white, restless, wandering)
 
 
 def find_grid(records: Sequence[Record]) -> np.ndarray:
@@ -197,7 +202,7 @@ def _find_restless(records: Sequence[Record], white: np.ndarray, most: np.ndarra
     return restless
 
 
-def _measure_wavering(records: Sequence[Record], white: np.ndarray, period: float, how: FloorSettings) -> np.ndarray:
+def _measure_wandering(records: Sequence[Record], white: np.ndarray, period: float, how: FloorSettings) -> np.ndarray:
     """Return how far joints move about what smooth commands explain [rad], shape (n_channels,); 0 without such windows.
 
     A window of a calm joint is a parabola and its own command, now and a little earlier, as far as noise goes. No

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,7 @@ from gsl.diagnosis.settings import FloorSettings
 SCALE = 5.0  # floors beyond which a residual counts less and less (Cauchy); 2.4 are 95 % efficient for normal noise
 BANDS = 5  # of the spectrum of a joint that shakes
 POWER_SD = 0.6  # of the logarithm of its power in one window, measured on replays of shaking by its true cause
+LEAST_CALM = 0.5  # of what white noise would move a calm joint by: some is taken for its slow motion. Measured: 0.6
 OF_BAND = 0.5  # share of the cost of the band that is furthest off: it is the worst of several
 
 
@@ -34,16 +36,23 @@ class Comparison:
         floor: Standard deviation that noise and a known model error explain [rad], shape (n_joints,).
         shaking: Joints whose phase a log cannot carry, shape (n_joints,).
         sway: How far these swing slowly at rest, or from one repeat to the next [rad], shape (n_joints,).
+        carried: Part of the floor of the others: by how much logs differ because these shake [rad], shape (n_joints,).
     """
 
     floor: np.ndarray
     shaking: np.ndarray
     sway: np.ndarray
+    carried: np.ndarray
 
     @classmethod
     def plain(cls, floor: np.ndarray) -> Comparison:
         """Return a comparison in which no joint shakes."""
-        return cls(floor, np.zeros(len(floor), dtype=bool), np.zeros(len(floor)))
+        return cls(floor, np.zeros(len(floor), dtype=bool), np.zeros(len(floor)), np.zeros(len(floor)))
+
+    @property
+    def noise(self) -> np.ndarray:
+        """The floor without what shaking neighbours do: what a simulated log gets [rad], shape (n_joints,)."""
+        return np.sqrt(self.floor**2 - self.carried**2)
 
     def residual(self, replayed: np.ndarray, pieces: Pieces) -> np.ndarray:
         """Return the residuals of the scored part, shape (W, scored, n_joints).
@@ -102,7 +111,8 @@ def _bands(x: np.ndarray) -> np.ndarray:
 def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSettings) -> Comparison:
     """Return how to compare, with the joints that shake while their commands rest or are smooth.
 
-    The floor of a joint that shakes is white noise, or that of the calm ones: its repeats differ by its phase.
+    The floor of a joint that shakes is white noise, or that of the calm ones: its repeats differ by its phase. Where
+    one shakes, the floor of the others holds how it carries them along: twice, for a replay has a phase of its own.
 
     Args:
         pieces: Of the log.
@@ -122,7 +132,21 @@ def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSetti
     sway = np.array([_sway(x) if shakes else 0.0 for x, shakes in zip(at_rest, shaking, strict=True)])
     sway = np.where(shaking, np.maximum(sway, noise.slow), 0.0)
     quiet = np.minimum(noise.sd, np.minimum(calm, noise.white))
-    return Comparison(np.where(shaking, quiet, noise.sd), shaking, sway)
+    carried = _measure_carried(at_rest, noise, shaking) if shaking.any() else np.zeros(joints)
+    return Comparison(np.hypot(np.where(shaking, quiet, noise.sd), carried), shaking, sway, carried)
+
+
+def _measure_carried(at_rest: Sequence[np.ndarray], noise: NoiseFloor, shaking: np.ndarray) -> np.ndarray:
+    """Return by how much logs of joints that do not shake differ because others do [rad], shape (n_joints,).
+
+    How far they move at rest, or about what smooth commands explain, is more than white noise; most joints are calm.
+    """
+    rests = np.sqrt([(x**2).mean() if len(x) else 0.0 for x in at_rest])
+    white = np.where(np.isfinite(noise.white), noise.white, noise.sd)[: len(rests)]  # unknown in short records
+    moved = np.maximum(rests, noise.wandering[: len(rests)]) / white
+    calm = min(1.0, float(np.median(moved[~shaking]))) if not shaking.all() else 1.0
+    excess = np.maximum(0.0, (moved / max(calm, LEAST_CALM)) ** 2 - 1.0)
+    return np.where(shaking, 0.0, np.sqrt(2.0 * excess) * white)
 
 
 def _calmest(rest: np.ndarray, usual: float) -> np.ndarray:

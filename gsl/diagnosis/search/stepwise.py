@@ -11,6 +11,7 @@ from gsl.diagnosis.hypothesis.common_mode import shares
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis, by_cost
 from gsl.diagnosis.hypothesis.problem import Ask, Problem
 from gsl.diagnosis.search.exempt import list_exemptions
+from gsl.diagnosis.search.pairs import fit_pairs
 from gsl.diagnosis.search.screening import extend, screen
 from gsl.diagnosis.search.selection import Selection, Thresholds, stands
 from gsl.diagnosis.search.zeros import SHIFTS, explains_zeros, moves_zeros_alone, zeros_aside
@@ -55,7 +56,7 @@ class Search:
         rejected, standing = self.part_singles(singles, least)
         self.tried = [self.none, *singles]
         if standing:
-            chosen = self._grow([self.exempt(standing[0]), *standing[1:]])
+            chosen = self._grow([self.exempt(standing[0]), *standing[1:]], singles if self._shaking else standing)
             chosen = self.split(self.exempt(self._polish(self.prune(chosen))))
             if self.thresholds.share:
                 chosen = self._challenge(chosen)
@@ -106,6 +107,10 @@ class Search:
     def _how(self) -> SearchSettings:
         return self.problem.settings
 
+    @property
+    def _shaking(self) -> bool:
+        return bool(self.problem.train.comparison.shaking.any())
+
     def _least(self) -> float:
         """Return what an effect has to gain over calibration alone."""
         return max(self.thresholds.gain, self.thresholds.share * self.none.cost)
@@ -116,12 +121,20 @@ class Search:
         start = np.concatenate([chosen.parameters[k] for k in kept])
         return Ask(tuple(chosen.candidates[k] for k in kept), start, chosen.fit.shifts)
 
-    def _grow(self, singles: list[Hypothesis]) -> Hypothesis:
-        """Add one effect after the other to the best single one as long as more is left than noise."""
-        chosen = self._polish(singles[0]) if self.thresholds.share else singles[0]
+    def _grow(self, standing: list[Hypothesis], singles: list[Hypothesis]) -> Hypothesis:
+        """Add one effect after the other to the best single one as long as more is left than noise.
+
+        Args:
+            standing: Single effects, from the first on that stands.
+            singles: Those to which another one is added, be they significant alone or not.
+        """
+        chosen = self._polish(standing[0]) if self.thresholds.share else standing[0]
         beam, level = self._distinct(singles), self._how.room
         while len({*chosen.names}) < self.most:
             better = self._add(self.problem, chosen, beam) if self._lacking(chosen, level) else []
+            if self._shaking and chosen.size == 1:
+                pairs = fit_pairs(self.problem, singles[0].candidates[0], self._how.leads_after)
+                better += self._standing(pairs, chosen)
             if not better and zeros_aside(self.problem, chosen):
                 better = self._add(self.problem.only(SHIFTS), chosen, [chosen])
             if not better:
@@ -133,6 +146,10 @@ class Search:
     def _add(self, problem: Problem, chosen: Hypothesis, beam: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return what stands against the chosen hypothesis of those with one effect more than one in the beam."""
         larger = [fit for base in beam for fit in extend(problem, base, self._how.leads_after)[0]]
+        return self._standing(larger, chosen)
+
+    def _standing(self, larger: Sequence[Hypothesis], chosen: Hypothesis) -> list[Hypothesis]:
+        """Return those of larger hypotheses that stand against the chosen one."""
         self.tried += larger
         return [fit for fit in larger if self._stands(fit, chosen, *self._bar(chosen))]
 
@@ -159,7 +176,7 @@ class Search:
         hides = self._most_to_free(standing) > self._how.hidden * min(
             self._bar(standing)[0], self._least_to_free(standing)
         )
-        return standing.level > level or few or hides or bool(self.problem.train.comparison.shaking.any())
+        return standing.level > level or few or hides or self._shaking
 
     def _most_to_free(self, standing: Hypothesis) -> float:
         """Return the prior cost that a cause would free most of: what the shifts of some joints have in common."""

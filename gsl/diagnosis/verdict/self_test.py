@@ -37,6 +37,7 @@ class Trial:
         answer: Effects of the hypothesis that won.
         costs: Held-out cost of each hypothesis that was fitted, in the order of the rivals.
         level: Of the truth.
+        levels: Of the truth by joint, shape (n_joints,).
         errors: Of the parameters that were fitted for the truth, shape (n_parameters,).
     """
 
@@ -44,6 +45,7 @@ class Trial:
     answer: tuple[str, ...]
     costs: tuple[float, ...]
     level: float
+    levels: np.ndarray
     errors: np.ndarray
 
 
@@ -77,7 +79,7 @@ def relog(
     played = play(
         log.records, plant, starts, step=step, period=log.period, settle=settle, accurate=accurate and not alone
     )
-    noisy = [path[:, :n] + log.comparison.floor * rng.standard_normal((len(path), n)) for path in played]
+    noisy = [path[:, :n] + log.comparison.noise * rng.standard_normal((len(path), n)) for path in played]
     return tuple(
         replace(record, position=position, velocity=slope(position, log.period))
         for record, position in zip(log.records, noisy, strict=True)
@@ -129,7 +131,7 @@ def duel(log: Log, problem: Problem, rivals: Sequence[Hypothesis], options: Opti
             fits = fake.fit_all([Ask(rival.candidates, rival.start, still) for rival in rivals])
             winner = min(fits, key=by_cost)
             costs, errors = tuple(fit.cost for fit in fits), fits[k].start - truth.start
-            trials.append(Trial(truth.names, winner.names, costs, fits[k].level, errors))
+            trials.append(Trial(truth.names, winner.names, costs, fits[k].level, fits[k].levels, errors))
             problem.tick("")
     return trials
 

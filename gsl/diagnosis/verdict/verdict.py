@@ -90,6 +90,7 @@ class Judge:
         guessed: Whether the noise floor is a guess: nothing was repeated, and nobody said what does not matter.
         settings: What counts.
         noise_cost: Of a residual that is nothing but noise.
+        odd: How much more the chosen hypothesis leaves of a shaking joint than in logs of its own, 1 if too much.
     """
 
     expected: float
@@ -102,6 +103,7 @@ class Judge:
     guessed: bool = False
     settings: VerdictSettings = field(default_factory=VerdictSettings)
     noise_cost: float = SearchSettings.noise_cost
+    odd: float = 0.0
 
     def judge(self, selection: Selection, missing: float = 0.0) -> Verdict:
         """Return what a selection allows to say.
@@ -128,7 +130,7 @@ class Judge:
             word = "unknown" if max(strange, missing) > 1.0 else "no_gap"
             return Verdict(word, (), (), 0.0, remaining, 1.0, how.whole, missing)
         causes = tuple(self._cause(selection, k) for k in range(chosen.size))
-        complete = self._completeness(explained, float(strange), missing)
+        complete = self._completeness(explained, float(strange), max(missing, self.odd))
         groups = self._inseparable(chosen, causes)
         sure = complete * (how.lone if self.lone else 1.0)
         scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
@@ -151,8 +153,8 @@ class Judge:
     def _completeness(self, explained: float, strange: float, missing: float) -> float:
         """Return the probability that the library holds what is at work.
 
-        Where it does not, a law of each servo explains more than the effects do; or, where no servo has such a law,
-        much is left of a gap that they hardly explain.
+        Where it does not, a law of each servo explains more than the effects do, or a joint shakes as they do not make
+        it; or, where no servo has such a law, much is left of a gap that they hardly explain.
         """
         enough = self.settings.explained
         left = min(strange - 1.0, (enough - explained) / (1.0 - enough))
