@@ -195,13 +195,14 @@ def _judge(
     )
 
 
-def _find_odd(log: Log, chosen: Hypothesis, own: Sequence[Trial], how: VerdictSettings) -> float:
-    """Return how much more a hypothesis leaves of a shaking joint than in logs of its own: logarithm, 1 if too much."""
+def _find_odd(log: Log, chosen: Hypothesis, own: Sequence[Trial], how: VerdictSettings) -> dict[str, float]:
+    """Return how oddly joints shake, by name: how much more than in logs of the hypothesis is left, 1 if too much."""
     if not own or not log.comparison.shaking.any():
-        return 0.0
-    usual = np.mean([trial.levels for trial in own], axis=0)
-    loud = log.comparison.shaking & (chosen.levels > how.loud)
-    return float(np.max(np.log(chosen.levels / usual)[loud], initial=0.0) / np.log(how.odd))
+        return {}
+    usual = np.max([trial.levels for trial in own], axis=0)
+    ratios = np.log(chosen.levels / usual) / np.log(how.odd)
+    loud = np.flatnonzero(log.comparison.shaking & (chosen.levels > how.loud))
+    return {log.channels[k]: float(ratios[k]) for k in loud}
 
 
 def _margins(rivals: Sequence[Hypothesis], own: Sequence[Trial]) -> dict[str, float]:

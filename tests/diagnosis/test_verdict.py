@@ -119,8 +119,9 @@ def test_a_rival_whose_own_logs_get_the_same_answer_is_not_told_apart() -> None:
 @pytest.mark.parametrize(("odd", "word"), [(0.7, "causes"), (1.3, "unknown")])
 def test_a_joint_that_shakes_as_its_causes_do_not_make_it_speaks_against_them(odd: float, word: str) -> None:
     """Whatever share of the gap they explain."""
-    verdict = Judge(1.0, odd=odd).judge(selection(friction("shoulder", 100.0)))
+    verdict = Judge(1.0, odd={"elbow": 0.2, "shoulder": odd}).judge(selection(friction("shoulder", 100.0)))
     assert verdict.word == word and verdict.explained == 1.0
+    assert verdict.odd == (("shoulder",) if odd > 1.0 else ())
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,7 @@ class NoiseFloor:
         samples: Independent numbers that it comes from, over all joints.
         white: Of white noise alone, from the quietest part of the spectrum [rad], shape (n_joints,).
         restless: Joints that move by much more than that, though commands are smooth, shape (n_joints,).
-        wandering: How far joints move about what smooth commands explain [rad], shape (n_joints,).
+        wandering: How far joints move about what smooth commands explain [rad], 0 where none are, shape (n_joints,).
     """
 
     sd: np.ndarray

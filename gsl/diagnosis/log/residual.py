@@ -132,21 +132,40 @@ def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSetti
     sway = np.array([_sway(x) if shakes else 0.0 for x, shakes in zip(at_rest, shaking, strict=True)])
     sway = np.where(shaking, np.maximum(sway, noise.slow), 0.0)
     quiet = np.minimum(noise.sd, np.minimum(calm, noise.white))
-    carried = _measure_carried(at_rest, noise, shaking) if shaking.any() else np.zeros(joints)
-    return Comparison(np.hypot(np.where(shaking, quiet, noise.sd), carried), shaking, sway, carried)
+    base, carried = np.where(shaking, quiet, noise.sd), np.zeros(joints)
+    if shaking.any():
+        moves = [real[rests] if rests.sum() >= settings.rests else None for rests in resting.T]
+        carried = _measure_carried(moves, noise, shaking, settings)
+        base = np.where(carried > 0.0, np.minimum(base, noise.white[:joints]), base)  # repeats differ by it as well
+    return Comparison(np.hypot(base, carried), shaking, sway, carried)
 
 
-def _measure_carried(at_rest: Sequence[np.ndarray], noise: NoiseFloor, shaking: np.ndarray) -> np.ndarray:
+def _measure_carried(
+    rests: Sequence[np.ndarray | None], noise: NoiseFloor, shaking: np.ndarray, settings: FloorSettings
+) -> np.ndarray:
     """Return by how much logs of joints that do not shake differ because others do [rad], shape (n_joints,).
 
-    How far they move at rest, or about what smooth commands explain, is more than white noise; most joints are calm.
+    It is what the motion of shaking joints explains while a joint rests, or what it moves by about smooth commands
+    beside white noise. Twice its power counts: a replay swings as well, at another phase.
+
+    Args:
+        rests: Positions in the windows in which each joint rests, shape (W, scored, n_channels); None of too few.
+        noise: Of the log.
+        shaking: Which joints shake, shape (n_joints,).
+        settings: How many ways of moving are looked at.
     """
-    rests = np.sqrt([(x**2).mean() if len(x) else 0.0 for x in at_rest])
-    white = np.where(np.isfinite(noise.white), noise.white, noise.sd)[: len(rests)]  # unknown in short records
-    moved = np.maximum(rests, noise.wandering[: len(rests)]) / white
-    calm = min(1.0, float(np.median(moved[~shaking]))) if not shaking.all() else 1.0
-    excess = np.maximum(0.0, (moved / max(calm, LEAST_CALM)) ** 2 - 1.0)
-    return np.where(shaking, 0.0, np.sqrt(2.0 * excess) * white)
+    n, by = len(shaking), np.flatnonzero(shaking)
+    white = np.where(np.isfinite(noise.white), noise.white, noise.sd)[:n]  # unknown in short records
+    power = np.zeros(n)
+    for joint, rest in enumerate(rests):
+        if rest is not None and not shaking[joint]:
+            moved = (_calmest(rest[..., joint], settings.usual) ** 2).mean()
+            power[joint] = moved * max(0.0, 1.0 - _share_of_its_own(rest, joint, settings, by))
+    if noise.wandering.any():  # there are smooth commands
+        calm = np.median((noise.wandering[:n] / white)[~shaking]) if not shaking.all() else 1.0
+        moved = (noise.wandering[:n] / np.clip(calm, LEAST_CALM, 1.0)) ** 2 - white**2
+        power = np.maximum(power, np.where(noise.wandering[:n] > noise.resolution, moved, 0.0))
+    return np.where(shaking, 0.0, np.sqrt(2.0 * power))
 
 
 def _calmest(rest: np.ndarray, usual: float) -> np.ndarray:
@@ -165,7 +184,7 @@ def _take_out(x: np.ndarray, basis: np.ndarray) -> np.ndarray:
     return np.asarray((column - basis @ (np.swapaxes(basis, -1, -2) @ column))[..., 0])
 
 
-def _share_of_its_own(rest: np.ndarray, joint: int, settings: FloorSettings) -> float:
+def _share_of_its_own(rest: np.ndarray, joint: int, settings: FloorSettings, by: np.ndarray | None = None) -> float:
     """Return the share of a resting joint's motion that the other joints' does not explain; 1 of a single joint.
 
     Gravity and inertia of the others bend its servo: by their positions, velocities and accelerations.
@@ -174,11 +193,12 @@ def _share_of_its_own(rest: np.ndarray, joint: int, settings: FloorSettings) -> 
         rest: Positions in the windows in which it rests, shape (W, scored, n_channels).
         joint: Which.
         settings: What counts as usual, and of how many ways in which the others move.
+        by: Which others, if not all.
     """
     (count, length, channels), ways = rest.shape, settings.ways
     if not count or channels == 1 or length < 2 * (3 * ways + 2):
         return 1.0
-    others = np.delete(rest, joint, axis=2)
+    others = np.delete(rest, joint, axis=2) if by is None else rest[..., by]
     moved = np.linalg.svd(others - others.mean(axis=1, keepdims=True), full_matrices=False)[0][..., :ways]
     rate = np.gradient(moved, axis=1)
     line = np.broadcast_to(_line(length), (count, length, 2))

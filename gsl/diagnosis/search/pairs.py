@@ -1,7 +1,7 @@
 """Pairs of effects that are looked for together, where joints shake.
 
-One effect alone then ends where it shakes a joint as much as the log, which is far from its value beside the other one:
-a late measurement shakes a damped joint less. From there no descent leads to the pair.
+One effect alone ends where it shakes a joint as much as the log. That is far from its value beside the other one: a
+late measurement shakes a damped joint less. From there no descent leads to the pair.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import numpy as np
 from gsl.diagnosis.hypothesis.candidates import Candidate, effects_of
 from gsl.diagnosis.hypothesis.hypothesis import Hypothesis
 from gsl.diagnosis.hypothesis.problem import Ask, Problem
+from gsl.diagnosis.log.log import spread
 from gsl.diagnosis.search.screening import Ground, Lead, screen_candidates
 
 
@@ -22,13 +23,13 @@ def fit_pairs(problem: Problem, candidate: Candidate, count: int) -> list[Hypoth
 
     Args:
         problem: Where they compete.
-        candidate: The first effect.
+        candidate: The first effect; one without a grid has no pairs.
         count: How many are fitted, each with another second effect.
     """
     best: dict[str, tuple[np.ndarray, Lead]] = {}
     for values, lead in _screen(problem, candidate):
         effect = lead.candidate.effect
-        if effect != candidate.effect and (effect not in best or lead.cost < best[effect][1].cost):
+        if effect not in best or lead.cost < best[effect][1].cost:
             best[effect] = values, lead
     return problem.fit_all(
         [
@@ -39,13 +40,16 @@ def fit_pairs(problem: Problem, candidate: Candidate, count: int) -> list[Hypoth
 
 
 def _screen(problem: Problem, candidate: Candidate) -> Iterator[tuple[np.ndarray, Lead]]:
-    """Screen the library on top of each value of an effect's grid that another effect may still make good."""
-    bench, settings = problem.glance, problem.settings
-    bench = replace(bench, pieces=bench.pieces.take(np.arange(0, len(bench.pieces), 2)))  # a coarse look is enough
+    """Screen the other effects on top of each value of an effect's grid that one of them may still make good."""
+    bench, settings, others = problem.glance, problem.settings, problem.without((candidate.effect,)).library
+    count = len(bench.pieces)
+    bench = replace(
+        bench, pieces=bench.pieces.take(spread(np.arange(count), (count + 1) // 2))
+    )  # a coarse look is enough
     far = settings.too_far * Ground.of(bench, {}).costs.sum()
-    for values in candidate.grid:
+    for values in candidate.grid[spread(np.arange(len(candidate.grid)), settings.values)]:
         ground = Ground.of(bench, effects_of((candidate,), (values,)))
         if ground.costs.sum() < far:
             seen = problem.memory.setdefault(("pairs", repr(ground.effects)), {})
-            screening = screen_candidates(ground, problem.library, problem.scopes, problem.tick, settings, seen)
+            screening = screen_candidates(ground, others, problem.scopes, problem.tick, settings, seen)
             yield from ((values, lead) for lead in screening.leads)

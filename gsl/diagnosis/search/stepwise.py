@@ -56,7 +56,11 @@ class Search:
         rejected, standing = self.part_singles(singles, least)
         self.tried = [self.none, *singles]
         if standing:
-            chosen = self._grow([self.exempt(standing[0]), *standing[1:]], singles if self._shaking else standing)
+            standing[0] = self.exempt(standing[0])
+        elif self._shaking and singles:  # one alone may be far from its value beside another
+            standing = sorted(self._pair(singles[0], self.none), key=by_cost)
+        if standing:
+            chosen = self._grow(standing, [standing[0], *singles] if self._shaking else standing)
             chosen = self.split(self.exempt(self._polish(self.prune(chosen))))
             if self.thresholds.share:
                 chosen = self._challenge(chosen)
@@ -126,15 +130,14 @@ class Search:
 
         Args:
             standing: Single effects, from the first on that stands.
-            singles: Those to which another one is added, be they significant alone or not.
+            singles: To which another one is added, be they significant alone or not.
         """
         chosen = self._polish(standing[0]) if self.thresholds.share else standing[0]
         beam, level = self._distinct(singles), self._how.room
         while len({*chosen.names}) < self.most:
             better = self._add(self.problem, chosen, beam) if self._lacking(chosen, level) else []
             if self._shaking and chosen.size == 1:
-                pairs = fit_pairs(self.problem, singles[0].candidates[0], self._how.leads_after)
-                better += self._standing(pairs, chosen)
+                better += self._pair(min(singles, key=by_cost), chosen)
             if not better and zeros_aside(self.problem, chosen):
                 better = self._add(self.problem.only(SHIFTS), chosen, [chosen])
             if not better:
@@ -147,6 +150,10 @@ class Search:
         """Return what stands against the chosen hypothesis of those with one effect more than one in the beam."""
         larger = [fit for base in beam for fit in extend(problem, base, self._how.leads_after)[0]]
         return self._standing(larger, chosen)
+
+    def _pair(self, single: Hypothesis, chosen: Hypothesis) -> list[Hypothesis]:
+        """Return what stands against the chosen hypothesis of pairs of a single effect and another one."""
+        return self._standing(fit_pairs(self.problem, single.candidates[0], self._how.leads_after), chosen)
 
     def _standing(self, larger: Sequence[Hypothesis], chosen: Hypothesis) -> list[Hypothesis]:
         """Return those of larger hypotheses that stand against the chosen one."""

@@ -100,7 +100,10 @@ def _log(findings: Findings, shrunk: Mapping[str, Any]) -> Iterator[str]:
             "but nothing says that it has to: record a motion twice, which measures the noise."
         )
     elif (
-        findings.verdict.word == "unknown" and shrunk["nearest_left"] and (shrunk["nearest_fraction"] or 0.0) >= NEARLY
+        findings.verdict.word == "unknown"
+        and not findings.verdict.odd
+        and shrunk["nearest_left"]
+        and (shrunk["nearest_fraction"] or 0.0) >= NEARLY
     ):
         yield _ask_what_matters(findings, shrunk)
 
@@ -133,6 +136,9 @@ def _joints(findings: Findings) -> Iterator[str]:
     if log.comparison.shaking.any():
         names = _names(log.channels, log.comparison.shaking)
         yield f"These joints shake though their commands do not, and are judged by the spectrum: {names}."
+    if findings.verdict.odd:
+        names = ", ".join(findings.verdict.odd)
+        yield f"The nearest effects make these joints shake otherwise, so the cause is another: {names}."
     sent = np.array([np.ptp(record.commands, axis=0) for record in log.records]).max(axis=0)
     sent = sent.reshape(-1, log.records[0].targets.shape[1])[:, : len(log.joints)]
     asked = sent[0]

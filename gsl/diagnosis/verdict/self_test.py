@@ -57,6 +57,7 @@ def relog(
     settings: VerdictSettings | None = None,
     *,
     accurate: bool = False,
+    carried: bool = False,
 ) -> tuple[Record, ...]:
     """Return what a plant would have logged to the records' commands, with the floor's noise.
 
@@ -70,6 +71,7 @@ def relog(
         rng: Of starts and noise.
         settings: How a record begins.
         accurate: Whether logs with other commands beside positions are made by a scheme of second order.
+        carried: Whether shaking joints take the others along, though they do not shake in this plant.
     """
     how, n = settings or VerdictSettings(), len(log.joints)
     alone, drive = log.records[0].beside is None, log.robot.drive
@@ -79,7 +81,8 @@ def relog(
     played = play(
         log.records, plant, starts, step=step, period=log.period, settle=settle, accurate=accurate and not alone
     )
-    noisy = [path[:, :n] + log.comparison.noise * rng.standard_normal((len(path), n)) for path in played]
+    noise = np.hypot(log.comparison.noise, log.comparison.carried / np.sqrt(2.0) * carried)  # which holds it twice
+    noisy = [path[:, :n] + noise * rng.standard_normal((len(path), n)) for path in played]
     return tuple(
         replace(record, position=position, velocity=slope(position, log.period))
         for record, position in zip(log.records, noisy, strict=True)
@@ -91,7 +94,7 @@ def repose(log: Log, problem: Problem, truth: Hypothesis, rng: np.random.Generat
     simulator = problem.simulator
     shifts = draw_shifts(rng, len(log.joints), simulator.spread)
     plant, step = change(simulator.plant, truth.effects, shifts), simulator.log_step
-    made = relog(log, plant, step, rng, accurate=simulator.accurate)
+    made = relog(log, plant, step, rng, accurate=simulator.accurate, carried=not truth.candidates)
     cut = cut_pieces(made, log.robot, log.period, warm_up=log.pieces.warm_up, scored=log.pieces.scored)
     index = {(int(r), int(t)): k for k, (r, t) in enumerate(zip(cut.record, cut.tick, strict=True))}
 

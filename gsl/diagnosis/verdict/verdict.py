@@ -52,6 +52,7 @@ class Verdict:
         missing: What a law of each servo explains beyond it: see `Laws.missing`.
         whole: Share of the excess from which on causes are all there is.
         hollow: Whether calibration alone is so far within a guessed noise that nothing has to be explained.
+        odd: Joints that shake otherwise than the chosen hypothesis makes them.
     """
 
     word: str
@@ -63,6 +64,7 @@ class Verdict:
     whole: float = VerdictSettings.whole
     missing: float = 0.0
     hollow: bool = False
+    odd: tuple[str, ...] = ()
 
     @property
     def names_causes(self) -> bool:
@@ -90,7 +92,7 @@ class Judge:
         guessed: Whether the noise floor is a guess: nothing was repeated, and nobody said what does not matter.
         settings: What counts.
         noise_cost: Of a residual that is nothing but noise.
-        odd: How much more the chosen hypothesis leaves of a shaking joint than in logs of its own, 1 if too much.
+        odd: How oddly joints shake, by name: how much more than in logs of the hypothesis is left, 1 if too much.
     """
 
     expected: float
@@ -103,7 +105,7 @@ class Judge:
     guessed: bool = False
     settings: VerdictSettings = field(default_factory=VerdictSettings)
     noise_cost: float = SearchSettings.noise_cost
-    odd: float = 0.0
+    odd: Mapping[str, float] = field(default_factory=dict)
 
     def judge(self, selection: Selection, missing: float = 0.0) -> Verdict:
         """Return what a selection allows to say.
@@ -130,7 +132,7 @@ class Judge:
             word = "unknown" if max(strange, missing) > 1.0 else "no_gap"
             return Verdict(word, (), (), 0.0, remaining, 1.0, how.whole, missing)
         causes = tuple(self._cause(selection, k) for k in range(chosen.size))
-        complete = self._completeness(explained, float(strange), max(missing, self.odd))
+        complete = self._completeness(explained, float(strange), max([missing, *self.odd.values()]))
         groups = self._inseparable(chosen, causes)
         sure = complete * (how.lone if self.lone else 1.0)
         scaled = tuple(replace(cause, probability=cause.probability * sure) for cause in causes)
@@ -139,7 +141,8 @@ class Judge:
             self.guessed and none.level < how.beneath * self.expected and freed <= min(selection.least, selection.freed)
         )
         word = "unknown" if hollow or complete < 0.5 else "inseparable" if groups else "causes"
-        return Verdict(word, scaled, groups, explained, remaining, complete, how.whole, missing, hollow)
+        odd = tuple(name for name, value in self.odd.items() if value > 1.0)
+        return Verdict(word, scaled, groups, explained, remaining, complete, how.whole, missing, hollow, odd)
 
     def _inseparable(self, chosen: Hypothesis, causes: tuple[Cause, ...]) -> tuple[tuple[str, ...], ...]:
         alike = () if self.walking else ALIKE
@@ -153,8 +156,8 @@ class Judge:
     def _completeness(self, explained: float, strange: float, missing: float) -> float:
         """Return the probability that the library holds what is at work.
 
-        Where it does not, a law of each servo explains more than the effects do, or a joint shakes as they do not make
-        it; or, where no servo has such a law, much is left of a gap that they hardly explain.
+        Where it does not, a law of each servo explains more than the effects do. Or a joint shakes as they do not make
+        it. Or, where no servo has such a law, much is left of a gap that they hardly explain.
         """
         enough = self.settings.explained
         left = min(strange - 1.0, (enough - explained) / (1.0 - enough))
