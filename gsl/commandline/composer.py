@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
+from hydra._internal.config_loader_impl import ConfigLoaderImpl
 from hydra.core.global_hydra import GlobalHydra
 from hydra.core.override_parser.overrides_parser import OverridesParser
 from hydra.core.override_parser.types import Override
@@ -79,9 +81,8 @@ def compose(command: str, arguments: Sequence[str], *, multirun: bool = False) -
             words = replace(words, config=_without_hydra(_compose(command, choices, trust)))
         overrides = [keep_text(override) if _takes_text(override, words.config) else override for override in overrides]
         signs = [_sign(override, words.config) for override in overrides]
-        config = _compose(
-            command, [sign + _first_value(override) for sign, override in zip(signs, overrides, strict=True)], trust
-        )
+        first = [sign + _first_value(override) for sign, override in zip(signs, overrides, strict=True)]
+        config = _compose_and_put(command, first, trust)
     except (CompactHydraException, OmegaConfBaseException, YAMLError) as error:
         raise unfit(command, arguments, unknown_key(error)) or translate(error, words) from error
     except ValueError as error:
@@ -216,6 +217,18 @@ def _first_value(override: Override) -> str:
             override.key_or_group, "fits no file of a group", given=str(override.input_line).partition("=")[2]
         )
     return f"{override.get_key_element()}={first}"
+
+
+def _compose_and_put(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:
+    """Compose the choices, and put the values in as hydra does: most commands differ in values alone."""
+    parsed = OverridesParser.create(config_loader=_loader()).parse_overrides(list(overrides))
+    choices, values = ([each for each in parsed if _is_choice(each) == is_so] for is_so in (True, False))
+    if any(each.package or each.key_or_group in groups() or each.is_hydra_override() for each in values):
+        return _compose(command, overrides, trust)
+    config = deepcopy(_compose(command, [str(each.input_line) for each in choices], trust))
+    ConfigLoaderImpl._apply_overrides_to_config(values, config)  # all that hydra does with values
+    check_code(plain(_without_hydra(config)), trust, references=True)
+    return config
 
 
 def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:

@@ -1,7 +1,8 @@
 """`compile_kernel` and `compile_inner`: numba's njit with a cache on disk, new whenever its sources change.
 
 Numba looks only at the file of a compiled function itself, so an edit of another one that it calls would go unseen.
-The sources are therefore the files that compile something, and all of gsl that these import.
+The sources are therefore the files that compile something, and all of gsl that these import. Where these files are and
+when they were written does not matter: copies of one version share what was compiled.
 Nor does it look whether the machine code on the disk is what it wrote, so every file begins with a hash of the rest.
 """
 
@@ -61,16 +62,19 @@ def compile_inner(function: F) -> F:
 
 def _compile(function: F, **more: bool) -> F:
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", **more}
+    ours = "NUMBA_CACHE_DIR" not in os.environ
     try:
-        if "NUMBA_CACHE_DIR" not in os.environ:
+        if ours:
             numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]
         dispatcher = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no home, or none that can be written
         dispatcher = numba.njit(**options)(function)
     kept: Any = getattr(dispatcher, "_cache", None)
     if hasattr(kept, "_impl"):  # not with NUMBA_DISABLE_JIT, or without a folder
-        place = kept._impl
-        kept._cache_file = _CheckedFiles(kept.cache_path, place.filename_base, place.locator.get_source_stamp())
+        base, path, stamp = kept._impl.filename_base, kept.cache_path, kept._impl.locator.get_source_stamp()
+        if ours and function.__module__.startswith("gsl."):  # what the folder is named by
+            path, stamp = os.path.join(_folder(), function.__module__), None
+        kept._cache_file = _CheckedFiles(path, base, stamp)
     return dispatcher
 
 
@@ -108,6 +112,7 @@ class _CheckedFiles(IndexDataCacheFile):
 
     def _write(self, path: str, thing: Any) -> None:
         contents = self._dump(thing)
+        os.makedirs(self._cache_path, exist_ok=True)
         with self._open_for_write(path) as file:
             file.write(hashlib.sha256(contents).digest() + contents)
 

@@ -58,8 +58,8 @@ def freeze(plant: Plant, pieces: Pieces, floor: np.ndarray, period: float) -> Fr
     _rigid_body(tree, middle, np.ascontiguousarray(speed), mobility, free)
     motion = windows.motion.copy()
     motion[:, 0] -= bias
-    commands = np.ascontiguousarray(windows.commands)
-    return Frozen(commands, motion, windows.clock, mobility, free, pieces.real, floor, bias, pieces.warm_up)
+    commands, real = (np.ascontiguousarray(path) for path in (windows.commands, pieces.real))
+    return Frozen(commands, motion, windows.clock, mobility, free, real, floor, bias, pieces.warm_up)
 
 
 @compile_kernel

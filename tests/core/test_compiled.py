@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -51,6 +52,20 @@ def test_a_damaged_cache_is_compiled_again_and_said(tmp_path: Path) -> None:
     said, warned = doubled(tmp_path)
     assert said.startswith("6.0 Counter({")
     assert warned == ""
+
+
+def test_copies_of_one_version_share_what_was_compiled(tmp_path: Path) -> None:
+    ramped = "from gsl.policies.gait import ramp; ramp(0.3); print(ramp.stats.cache_hits, ramp.__module__)"
+    said = []
+    for name in ("one", "other"):
+        shutil.copytree(SOURCES, tmp_path / name / "gsl", ignore=shutil.ignore_patterns("__pycache__"))
+        (tmp_path / name / "gsl" / "policies" / "gait.py").touch()
+        more = {"PYTHONPATH": str(tmp_path / name), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+        environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"} | more
+        command = [sys.executable, "-c", ramped]
+        said.append(subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True))
+    assert said[0].stdout == "Counter() gsl.policies.gait\n"
+    assert said[1].stdout == "Counter({(float64,): 1}) gsl.policies.gait\n"
 
 
 def test_the_sources_are_what_compiled_files_import_and_no_others(tmp_path: Path) -> None:
