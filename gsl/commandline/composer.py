@@ -223,12 +223,18 @@ def _compose_and_put(command: str, overrides: Sequence[str], trust: Sequence[str
     """Compose the choices, and put the values in as hydra does: most commands differ in values alone."""
     parsed = OverridesParser.create(config_loader=_loader()).parse_overrides(list(overrides))
     choices, values = ([each for each in parsed if _is_choice(each) == is_so] for is_so in (True, False))
-    if any(each.package or each.key_or_group in groups() or each.is_hydra_override() for each in values):
+    if any(isinstance(each.value(), dict) for each in choices) or any(map(_asks_for_a_group, values)):
         return _compose(command, overrides, trust)
     config = deepcopy(_compose(command, [str(each.input_line) for each in choices], trust))
     ConfigLoaderImpl._apply_overrides_to_config(values, config)  # all that hydra does with values
     check_code(plain(_without_hydra(config)), trust, references=True)
     return config
+
+
+def _asks_for_a_group(value: Override) -> bool:
+    """Whether what is no choice may still be of a group: one that goes, of a folder below, or of hydra's own."""
+    key = value.key_or_group
+    return value.package is not None or "/" in key or key in groups() or key.partition(".")[0] == "hydra"
 
 
 def _compose(command: str, overrides: Sequence[str], trust: Sequence[str]) -> DictConfig:

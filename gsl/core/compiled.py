@@ -1,8 +1,8 @@
 """`compile_kernel` and `compile_inner`: numba's njit with a cache on disk, new whenever its sources change.
 
 Numba looks only at the file of a compiled function itself, so an edit of another one that it calls would go unseen.
-The sources are therefore the files that compile something, and all of gsl that these import. Where these files are and
-when they were written does not matter: copies of one version share what was compiled.
+The sources are therefore the files that compile something, and all of gsl that these import. Where these files are does
+not matter: copies of one version share what was compiled.
 Nor does it look whether the machine code on the disk is what it wrote, so every file begins with a hash of the rest.
 """
 
@@ -62,19 +62,18 @@ def compile_inner(function: F) -> F:
 
 def _compile(function: F, **more: bool) -> F:
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", **more}
-    ours = "NUMBA_CACHE_DIR" not in os.environ
     try:
-        if ours:
+        if "NUMBA_CACHE_DIR" not in os.environ:
             numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]
         dispatcher = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no home, or none that can be written
         dispatcher = numba.njit(**options)(function)
     kept: Any = getattr(dispatcher, "_cache", None)
     if hasattr(kept, "_impl"):  # not with NUMBA_DISABLE_JIT, or without a folder
-        base, path, stamp = kept._impl.filename_base, kept.cache_path, kept._impl.locator.get_source_stamp()
-        if ours and function.__module__.startswith("gsl."):  # what the folder is named by
-            path, stamp = os.path.join(_folder(), function.__module__), None
-        kept._cache_file = _CheckedFiles(path, base, stamp)
+        place, path = kept._impl, Path(kept.cache_path)
+        if path.parent == Path(_folder()):  # not where numba found no other place than beside the source
+            path = path.with_name(function.__module__)  # it has a hash of where the source is
+        kept._cache_file = _CheckedFiles(str(path), place.filename_base, place.locator.get_source_stamp())
     return dispatcher
 
 
@@ -131,7 +130,7 @@ def _say_once(folder: str) -> None:
 
 @cache
 def _folder() -> str:
-    sources = hashlib.sha256()
+    sources = hashlib.sha256(numba.__version__.encode())
     for path in find_sources(Path(__file__).parents[1]):
         sources.update(path.read_bytes())
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")

@@ -244,6 +244,31 @@ def test_a_file_of_the_user_wins_over_ours(elsewhere: Path, capsys: pytest.Captu
     assert json.loads(capsys.readouterr().out)["episodes"] == 77
 
 
+def test_a_file_of_a_folder_below_a_group_is_taken(elsewhere: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (elsewhere / "mine/experiment/arms").mkdir(parents=True)
+    (elsewhere / "mine/experiment/arms/both.yaml").write_text("# @package _global_\nepisodes: 7\n")
+    line = ["collect", "--config-dir", "mine", "+experiment/arms=both", "--cfg", "job", "--json"]
+    assert call(line) == 0
+    assert json.loads(capsys.readouterr().out)["episodes"] == 7
+
+
+@pytest.mark.parametrize("mapping", ["world={step: 0.002}", "++world.step=0.002"])
+def test_the_last_word_counts(
+    mapping: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.delenv("GSL_CONFIG_DIR")
+    for words in (["world.step=0.001", mapping], [mapping, "world.step=0.001"]):
+        assert call(["collect", "--cfg", "job", "--json", *words]) == 0
+        last = 0.002 if words[-1] == mapping else 0.001
+        assert json.loads(capsys.readouterr().out)["world"]["step"] == last
+
+
+@pytest.mark.parametrize("word", ["~hydra", "hydra=other", "++hydra=null"])
+def test_settings_of_hydras_own_end_in_one_line(word: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call(["collect", word]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+
+
 def test_help_shows_groups_settings_and_effects(capsys: pytest.CaptureFixture[str]) -> None:
     assert call(["evaluate", "--help"]) == 0
     text = capsys.readouterr().out

@@ -54,18 +54,24 @@ def test_a_damaged_cache_is_compiled_again_and_said(tmp_path: Path) -> None:
     assert warned == ""
 
 
+def run_ramp(package: Path, **more: str) -> str:
+    """Run a kernel of a copy of gsl; return how often the cache had it."""
+    (package / "policies" / "gait.py").touch()
+    kept = {key: value for key, value in os.environ.items() if key not in ("NUMBA_CACHE_DIR", "XDG_CACHE_HOME")}
+    code = "from gsl.policies.gait import ramp; ramp(0.3); print(ramp.stats.cache_hits)"
+    environment = {**kept, "PYTHONPATH": str(package.parent), **more}
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, env=environment, cwd=package, capture_output=True, text=True, check=True)
+    return done.stdout
+
+
 def test_copies_of_one_version_share_what_was_compiled(tmp_path: Path) -> None:
-    ramped = "from gsl.policies.gait import ramp; ramp(0.3); print(ramp.stats.cache_hits, ramp.__module__)"
-    said = []
-    for name in ("one", "other"):
-        shutil.copytree(SOURCES, tmp_path / name / "gsl", ignore=shutil.ignore_patterns("__pycache__"))
-        (tmp_path / name / "gsl" / "policies" / "gait.py").touch()
-        more = {"PYTHONPATH": str(tmp_path / name), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-        environment = {key: value for key, value in os.environ.items() if key != "NUMBA_CACHE_DIR"} | more
-        command = [sys.executable, "-c", ramped]
-        said.append(subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True))
-    assert said[0].stdout == "Counter() gsl.policies.gait\n"
-    assert said[1].stdout == "Counter({(float64,): 1}) gsl.policies.gait\n"
+    one, other = (tmp_path / name / "gsl" for name in ("one", "other"))
+    for copy in (one, other):
+        shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    assert run_ramp(one, HOME="/proc/none") == "Counter()\n"  # compiled beside the source: there is no other place
+    assert run_ramp(one, XDG_CACHE_HOME=str(tmp_path)) == "Counter()\n"
+    assert run_ramp(other, XDG_CACHE_HOME=str(tmp_path)) == "Counter({(float64,): 1})\n"
 
 
 def test_the_sources_are_what_compiled_files_import_and_no_others(tmp_path: Path) -> None:

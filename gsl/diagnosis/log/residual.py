@@ -15,6 +15,9 @@ SCALE = 5.0  # floors beyond which a residual counts less and less (Cauchy); 2.4
 BANDS = 5  # of the spectrum of a joint that shakes
 POWER_SD = 0.6  # of the logarithm of its power in one window, measured on replays of shaking by its true cause
 LEAST_CALM = 0.5  # of what white noise would move a calm joint by: some is taken for its slow motion. Measured: 0.6
+BY_CHANCE = (
+    0.2  # share of a joint's motion that shaking ones explain though they do not carry it: two spreads of two windows
+)
 OF_BAND = 0.5  # share of the cost of the band that is furthest off: it is the worst of several
 
 
@@ -134,38 +137,51 @@ def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSetti
     quiet = np.minimum(noise.sd, np.minimum(calm, noise.white))
     base, carried = np.where(shaking, quiet, noise.sd), np.zeros(joints)
     if shaking.any():
-        moves = [real[rests] if rests.sum() >= settings.rests else None for rests in resting.T]
-        carried = _measure_carried(moves, noise, shaking, settings)
-        base = np.where(carried > 0.0, np.minimum(base, noise.white[:joints]), base)  # repeats differ by it as well
+        left = _without_commands(pieces, settings)
+        carried = _measure_carried([left[rests] for rests in resting.T], noise, shaking, settings)
+        repeated = np.minimum(base, noise.white[:joints])  # repeats differ by it as well, once
+        base = np.sqrt(np.maximum(base**2 - carried**2 / 2.0, repeated**2))
     return Comparison(np.hypot(base, carried), shaking, sway, carried)
 
 
 def _measure_carried(
-    rests: Sequence[np.ndarray | None], noise: NoiseFloor, shaking: np.ndarray, settings: FloorSettings
+    rests: Sequence[np.ndarray], noise: NoiseFloor, shaking: np.ndarray, settings: FloorSettings
 ) -> np.ndarray:
     """Return by how much logs of joints that do not shake differ because others do [rad], shape (n_joints,).
 
-    It is what the motion of shaking joints explains while a joint rests, or what it moves by about smooth commands
-    beside white noise. Twice its power counts: a replay swings as well, at another phase.
+    It is what the motion of shaking joints explains while a joint rests. Or it is what a joint moves by about smooth
+    commands beside white noise, as far as repeats differ. Twice its power counts: a replay swings at another phase.
 
     Args:
-        rests: Positions in the windows in which each joint rests, shape (W, scored, n_channels); None of too few.
+        rests: Of the windows in which each joint rests, what commands do not explain, shape (W, scored, n_channels).
         noise: Of the log.
         shaking: Which joints shake, shape (n_joints,).
-        settings: How many ways of moving are looked at.
+        settings: How many windows it takes, and of how many ways in which others move.
     """
     n, by = len(shaking), np.flatnonzero(shaking)
     white = np.where(np.isfinite(noise.white), noise.white, noise.sd)[:n]  # unknown in short records
     power = np.zeros(n)
-    for joint, rest in enumerate(rests):
-        if rest is not None and not shaking[joint]:
-            moved = (_calmest(rest[..., joint], settings.usual) ** 2).mean()
-            power[joint] = moved * max(0.0, 1.0 - _share_of_its_own(rest, joint, settings, by))
+    for joint in np.flatnonzero(~shaking).tolist():
+        explained = 1.0 - _share_of_its_own(rests[joint], joint, settings, by)
+        if len(rests[joint]) >= settings.rests and explained > BY_CHANCE:
+            power[joint] = explained * (_calmest(rests[joint][..., joint], settings.usual) ** 2).mean()
     if noise.wandering.any():  # there are smooth commands
         calm = np.median((noise.wandering[:n] / white)[~shaking]) if not shaking.all() else 1.0
         moved = (noise.wandering[:n] / np.clip(calm, LEAST_CALM, 1.0)) ** 2 - white**2
-        power = np.maximum(power, np.where(noise.wandering[:n] > noise.resolution, moved, 0.0))
+        most = noise.sd[:n] ** 2 - white**2 if noise.source == "repeats" else np.inf
+        power = np.maximum(power, np.where(noise.wandering[:n] > noise.resolution, np.minimum(moved, most), 0.0))
     return np.where(shaking, 0.0, np.sqrt(2.0 * power))
+
+
+def _without_commands(pieces: Pieces, settings: FloorSettings) -> np.ndarray:
+    """Return positions less their line and the main ways in which commands move, shape (W, scored, n_channels)."""
+    real, late, motors = pieces.real[:, pieces.warm_up :], settings.late, pieces.windows.motion.shape[2]
+    sent = pieces.windows.commands[:, real.shape[1] + late[-1] - 1 :: -1, :motors]
+    moved = np.linalg.svd(sent - sent.mean(axis=1, keepdims=True), full_matrices=False)[0][..., : settings.ways]
+    lagged = [moved[:, late[-1] - lag :][:, : real.shape[1]] for lag in late]
+    line = np.broadcast_to(_line(real.shape[1]), (*real.shape[:2], 2))
+    basis = np.linalg.qr(np.concatenate([line, *lagged], axis=2))[0]
+    return np.asarray(real - basis @ (np.swapaxes(basis, -1, -2) @ real))
 
 
 def _calmest(rest: np.ndarray, usual: float) -> np.ndarray:

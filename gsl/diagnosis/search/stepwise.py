@@ -57,9 +57,6 @@ class Search:
         self.tried = [self.none, *singles]
         if standing:
             standing[0] = self.exempt(standing[0])
-        elif self._shaking and singles:  # one alone may be far from its value beside another
-            standing = sorted(self._pair(singles[0], self.none), key=by_cost)
-        if standing:
             chosen = self._grow(standing, [standing[0], *singles] if self._shaking else standing)
             chosen = self.split(self.exempt(self._polish(self.prune(chosen))))
             if self.thresholds.share:

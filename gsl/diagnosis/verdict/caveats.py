@@ -138,7 +138,7 @@ def _joints(findings: Findings) -> Iterator[str]:
         yield f"These joints shake though their commands do not, and are judged by the spectrum: {names}."
     if findings.verdict.odd:
         names = ", ".join(findings.verdict.odd)
-        yield f"The nearest effects make these joints shake otherwise, so the cause is another: {names}."
+        yield f"The nearest effects make these joints shake otherwise, so something else is at work: {names}."
     sent = np.array([np.ptp(record.commands, axis=0) for record in log.records]).max(axis=0)
     sent = sent.reshape(-1, log.records[0].targets.shape[1])[:, : len(log.joints)]
     asked = sent[0]

@@ -67,7 +67,7 @@ def document(findings: Findings, **about: Any) -> dict[str, Any]:
         "floor": {
             "source": log.noise.source,
             "pairs": log.noise.pairs,
-            "sd": dict(zip(log.channels, (log.comparison.noise * _ways(log)).tolist(), strict=True)),
+            "sd": dict(zip(log.channels, (log.comparison.floor * _ways(log)).tolist(), strict=True)),
         },
         "invisible": list(findings.selection.screening.invisible),
         "unexplained": far,
