@@ -66,11 +66,11 @@ def run_ramp(package: Path, **more: str) -> str:
 
 
 def test_copies_of_one_version_share_what_was_compiled(tmp_path: Path) -> None:
-    one, other = (tmp_path / name / "gsl" for name in ("one", "other"))
-    for copy in (one, other):
+    first, other = (tmp_path / name / "gsl" for name in ("one", "other"))
+    for copy in (first, other):
         shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
-    assert run_ramp(one, HOME="/proc/none") == "Counter()\n"  # compiled beside the source: there is no other place
-    assert run_ramp(one, XDG_CACHE_HOME=str(tmp_path)) == "Counter()\n"
+    assert run_ramp(first, HOME="/proc/none") == "Counter()\n"  # compiled beside the source: there is no other place
+    assert run_ramp(first, XDG_CACHE_HOME=str(tmp_path)) == "Counter()\n"
     assert run_ramp(other, XDG_CACHE_HOME=str(tmp_path)) == "Counter({(float64,): 1})\n"
 
 
