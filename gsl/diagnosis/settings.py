@@ -205,10 +205,8 @@ class VerdictSettings:
     foreign: float = 1.12  # remaining cost, and
     explained: float = 0.85  # share explained, beyond which nothing of the library is the cause
     local: float = 1.5  # remaining cost of one joint that is as strange
-    odd: float = (
-        6.0  # times what own logs leave of a shaking joint. Measured: to 4.2 on 11 true causes, 8.8 on 2 others
-    )
-    loud: float = 1.5  # cost of a joint's residual below which it is not odd. Estimate
+    odd: float = 7.0  # times the most that two own logs leave of a shaking joint. Measured: to 4.2 if true, 14 if not
+    loud: float = 2.0  # cost of a joint's residual below which it is not odd: one that hardly shakes may, or may not
     soft: float = 0.15  # how gradually strangeness turns into `unknown`
     unrivalled: float = 0.9  # probability of an effect in whose place no other was tried: where replays are slow
     lone: float = 0.8  # factor on probabilities where parts of one motion are held out: they share what is its own
