@@ -62,16 +62,17 @@ def compile_inner(function: F) -> F:
 
 def _compile(function: F, **more: bool) -> F:
     options: dict[str, Any] = {"nogil": True, "error_model": "numpy", **more}
+    ours = ""
     try:
         if "NUMBA_CACHE_DIR" not in os.environ:
-            numba.config.CACHE_DIR = _folder()  # type: ignore[attr-defined]
+            numba.config.CACHE_DIR = ours = _folder()  # type: ignore[attr-defined]
         dispatcher = numba.njit(cache=True, **options)(function)
     except RuntimeError:  # no home, or none that can be written
         dispatcher = numba.njit(**options)(function)
     kept: Any = getattr(dispatcher, "_cache", None)
     if hasattr(kept, "_impl"):  # not with NUMBA_DISABLE_JIT, or without a folder
         place, path = kept._impl, Path(kept.cache_path)
-        if path.parent == Path(_folder()):  # not where numba found no other place than beside the source
+        if ours and path.parent == Path(ours):  # not where numba found no other place than beside the source
             path = path.with_name(function.__module__)  # it has a hash of where the source is
         kept._cache_file = _CheckedFiles(str(path), place.filename_base, place.locator.get_source_stamp())
     return dispatcher

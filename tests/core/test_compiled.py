@@ -69,6 +69,8 @@ def test_copies_of_one_version_share_what_was_compiled(tmp_path: Path) -> None:
     first, other = (tmp_path / name / "gsl" for name in ("one", "other"))
     for copy in (first, other):
         shutil.copytree(SOURCES, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    kept = {"HOME": "/proc/none", "NUMBA_CACHE_DIR": str(tmp_path / "elsewhere")}
+    assert run_ramp(first, **kept) == "Counter()\n" and any((tmp_path / "elsewhere").iterdir())
     assert run_ramp(first, HOME="/proc/none") == "Counter()\n"  # compiled beside the source: there is no other place
     assert run_ramp(first, XDG_CACHE_HOME=str(tmp_path)) == "Counter()\n"
     assert run_ramp(other, XDG_CACHE_HOME=str(tmp_path)) == "Counter({(float64,): 1})\n"

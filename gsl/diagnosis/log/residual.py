@@ -15,9 +15,7 @@ SCALE = 5.0  # floors beyond which a residual counts less and less (Cauchy); 2.4
 BANDS = 5  # of the spectrum of a joint that shakes
 POWER_SD = 0.6  # of the logarithm of its power in one window, measured on replays of shaking by its true cause
 LEAST_CALM = 0.5  # of what white noise would move a calm joint by: some is taken for its slow motion. Measured: 0.6
-BY_CHANCE = (
-    0.2  # share of a joint's motion that shaking ones explain though they do not carry it: two spreads of two windows
-)
+BY_CHANCE = 0.2  # share of a joint's motion that shaking ones explain by chance: two spreads of two windows
 OF_BAND = 0.5  # share of the cost of the band that is furthest off: it is the worst of several
 
 
@@ -137,14 +135,14 @@ def compare(pieces: Pieces, noise: NoiseFloor, joints: int, settings: FloorSetti
     quiet = np.minimum(noise.sd, np.minimum(calm, noise.white))
     base, carried = np.where(shaking, quiet, noise.sd), np.zeros(joints)
     if shaking.any():
-        left = _without_commands(pieces, settings)
-        carried = _measure_carried([left[rests] for rests in resting.T], noise, shaking, settings)
+        left = _take_out_commands(pieces, settings)
+        carried = _measure_carrying([left[rests] for rests in resting.T], noise, shaking, settings)
         repeated = np.minimum(base, noise.white[:joints])  # repeats differ by it as well, once
         base = np.sqrt(np.maximum(base**2 - carried**2 / 2.0, repeated**2))
     return Comparison(np.hypot(base, carried), shaking, sway, carried)
 
 
-def _measure_carried(
+def _measure_carrying(
     rests: Sequence[np.ndarray], noise: NoiseFloor, shaking: np.ndarray, settings: FloorSettings
 ) -> np.ndarray:
     """Return by how much logs of joints that do not shake differ because others do [rad], shape (n_joints,).
@@ -173,7 +171,7 @@ def _measure_carried(
     return np.where(shaking, 0.0, np.sqrt(2.0 * power))
 
 
-def _without_commands(pieces: Pieces, settings: FloorSettings) -> np.ndarray:
+def _take_out_commands(pieces: Pieces, settings: FloorSettings) -> np.ndarray:
     """Return positions less their line and the main ways in which commands move, shape (W, scored, n_channels)."""
     real, late, motors = pieces.real[:, pieces.warm_up :], settings.late, pieces.windows.motion.shape[2]
     sent = pieces.windows.commands[:, real.shape[1] + late[-1] - 1 :: -1, :motors]
@@ -181,12 +179,12 @@ def _without_commands(pieces: Pieces, settings: FloorSettings) -> np.ndarray:
     lagged = [moved[:, late[-1] - lag :][:, : real.shape[1]] for lag in late]
     line = np.broadcast_to(_line(real.shape[1]), (*real.shape[:2], 2))
     basis = np.linalg.qr(np.concatenate([line, *lagged], axis=2))[0]
-    return np.asarray(real - basis @ (np.swapaxes(basis, -1, -2) @ real))
+    return _take_out(real, basis)
 
 
 def _calmest(rest: np.ndarray, usual: float) -> np.ndarray:
     """Return the calmest of resting windows, shape (W, scored), each less its line."""
-    x = _take_out(rest, _line(rest.shape[1]))
+    x = _take_out(rest[..., None], _line(rest.shape[1]))[..., 0]
     return np.asarray(x[np.argsort((x**2).mean(axis=1))[: max(1, round(usual * len(x)))]])
 
 
@@ -195,9 +193,8 @@ def _line(length: int) -> np.ndarray:
 
 
 def _take_out(x: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """Return windows, shape (W, T), less what an orthonormal basis explains, shape (T, k) or (W, T, k)."""
-    column = x[..., None]
-    return np.asarray((column - basis @ (np.swapaxes(basis, -1, -2) @ column))[..., 0])
+    """Return windows, shape (W, T, n), less what an orthonormal basis explains, shape (T, k) or (W, T, k)."""
+    return np.asarray(x - basis @ (np.swapaxes(basis, -1, -2) @ x))
 
 
 def _share_of_its_own(rest: np.ndarray, joint: int, settings: FloorSettings, by: np.ndarray | None = None) -> float:
@@ -219,8 +216,8 @@ def _share_of_its_own(rest: np.ndarray, joint: int, settings: FloorSettings, by:
     rate = np.gradient(moved, axis=1)
     line = np.broadcast_to(_line(length), (count, length, 2))
     basis = np.linalg.qr(np.concatenate([line, moved, rate, np.gradient(rate, axis=1)], axis=2))[0]
-    x = rest[..., joint]
-    moves, left = ((_take_out(x, part) ** 2).sum(axis=1) / (length - part.shape[-1]) for part in (line, basis))
+    x = rest[..., [joint]]
+    moves, left = ((_take_out(x, part) ** 2).sum(axis=(1, 2)) / (length - part.shape[-1]) for part in (line, basis))
     usual = np.argsort(moves)[: max(1, round(settings.usual * count))]
     return float(left[usual].mean() / max(moves[usual].mean(), 1e-30))
 

@@ -146,13 +146,13 @@ class Search:
     def _add(self, problem: Problem, chosen: Hypothesis, beam: Sequence[Hypothesis]) -> list[Hypothesis]:
         """Return what stands against the chosen hypothesis of those with one effect more than one in the beam."""
         larger = [fit for base in beam for fit in extend(problem, base, self._how.leads_after)[0]]
-        return self._standing(larger, chosen)
+        return self._keep_standing(larger, chosen)
 
     def _pair(self, single: Hypothesis, chosen: Hypothesis) -> list[Hypothesis]:
         """Return what stands against the chosen hypothesis of pairs of a single effect and another one."""
-        return self._standing(fit_pairs(self.problem, single.candidates[0], self._how.leads_after), chosen)
+        return self._keep_standing(fit_pairs(self.problem, single.candidates[0], self._how.leads_after), chosen)
 
-    def _standing(self, larger: Sequence[Hypothesis], chosen: Hypothesis) -> list[Hypothesis]:
+    def _keep_standing(self, larger: Sequence[Hypothesis], chosen: Hypothesis) -> list[Hypothesis]:
         """Return those of larger hypotheses that stand against the chosen one."""
         self.tried += larger
         return [fit for fit in larger if self._stands(fit, chosen, *self._bar(chosen))]
